@@ -1,0 +1,289 @@
+//! A bake: the interpolated mesh, what was measured of it, and its evaluation on the CPU.
+
+use glam::{DVec3, Vec3};
+use serde::{Deserialize, Serialize};
+
+use crate::{Bvh, Interpolant, Ray, Rgb, SAMPLE_BARYCENTRICS, Scene, SceneError};
+
+/// The result of a bake: everything that a viewer needs.
+///
+/// Triangles partition every polygon of the scene. Two triangles that share an edge refer to the same samples on
+/// it, so irradiance is continuous by structure, except across cuts and at contact corners.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Baked {
+    /// The scene that was baked, as the importer repaired it.
+    pub scene: Scene,
+    /// Positions of the mesh's vertices, metres; shared across polygons, so that no crack can open.
+    pub vertices: Vec<Vec3>,
+    /// Irradiance samples, W·m⁻².
+    pub samples: Vec<Vec3>,
+    /// The triangles.
+    pub triangles: Vec<BakedTriangle>,
+    /// Per triangle, the largest error over its probe points, relative to max(own, mean) irradiance.
+    pub triangle_errors: Vec<f32>,
+    /// The solver's leaf elements, which the flat mode and the element mode show.
+    pub elements: Vec<BakedElement>,
+    /// The discontinuities that the mesh follows.
+    pub lines: Vec<DiscontinuityLine>,
+    /// Errors over the whole bake, measured at probe points.
+    pub error: BakedError,
+    /// What made this bake.
+    pub provenance: Provenance,
+}
+
+/// One triangle and the six samples of its interpolant.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct BakedTriangle {
+    /// Vertex ids, counter-clockwise seen from the front of the polygon.
+    pub vertices: [u32; 3],
+    /// Sample ids r0 … r5, in the order of [`SAMPLE_BARYCENTRICS`].
+    pub samples: [u32; 6],
+    /// The polygon of the scene that the triangle is a part of.
+    pub polygon: u32,
+    /// The element whose leaf the triangle is a part of.
+    pub element: u32,
+    /// What the edges 0→1, 1→2 and 2→0 are.
+    pub edges: [EdgeKind; 3],
+}
+
+/// Why a triangle ends at an edge.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum EdgeKind {
+    /// The triangulation put it there.
+    #[default]
+    Interior,
+    /// The border of a leaf.
+    Leaf,
+    /// A contact or intersection line; irradiance may jump here.
+    Cut,
+    /// A discontinuity, an index into [`Baked::lines`].
+    Discontinuity(u32),
+}
+
+/// A leaf of the solver's quadtree.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct BakedElement {
+    /// The polygon it lies on.
+    pub polygon: u32,
+    /// The solver's constant irradiance, W·m⁻².
+    pub irradiance: Vec3,
+}
+
+/// The geometric event that makes a discontinuity (Hardt & Teller 1996, section 4.1).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+pub enum LineKind {
+    /// The source's plane meets the receiver: the source rises over the receiver's horizon.
+    Horizon,
+    /// An edge of the source passes behind a vertex of the blocker.
+    EdgeVertex,
+    /// A vertex of the source passes behind an edge of the blocker.
+    VertexEdge,
+}
+
+/// A discontinuity that was kept.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct DiscontinuityLine {
+    /// The event that makes it.
+    pub kind: LineKind,
+    /// Receiving polygon.
+    pub receiver: u32,
+    /// Source polygon.
+    pub source: u32,
+    /// Blocking polygon; the source itself for a horizon line.
+    pub blocker: u32,
+    /// Rank weight, W·m⁻² (section 4.2).
+    pub weight: f32,
+    /// Ends on the receiver, metres.
+    pub ends: [Vec3; 2],
+}
+
+/// Errors of the interpolants at points that they were not fitted to, each relative to max(own, mean) irradiance.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct BakedError {
+    /// Root of the area-weighted mean square.
+    pub rms: f64,
+    /// 99th percentile by area.
+    pub p99: f64,
+    /// Largest.
+    pub max: f64,
+    /// Number of points compared.
+    pub points: u64,
+}
+
+/// What made a bake. No times, no paths, no thread counts: the same input gives the same bytes.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Provenance {
+    /// Program and version.
+    pub program: String,
+    /// The options that matter for the result, as name and value.
+    pub options: Vec<(String, String)>,
+    /// Counts that the stages reported, as name and value.
+    pub statistics: Vec<(String, f64)>,
+}
+
+impl Baked {
+    /// Corner positions of a triangle, metres.
+    pub fn corners(&self, triangle: u32) -> [DVec3; 3] {
+        self.triangles[triangle as usize].vertices.map(|vertex| self.vertices[vertex as usize].as_dvec3())
+    }
+
+    /// The quadratic of a triangle.
+    pub fn interpolant(&self, triangle: u32) -> Interpolant {
+        let samples = self.triangles[triangle as usize].samples;
+        Interpolant::through(samples.map(|sample| self.samples[sample as usize].as_dvec3()))
+    }
+
+    /// Irradiance at barycentrics (s, t) of a triangle, W·m⁻², never negative.
+    pub fn irradiance(&self, triangle: u32, s: f64, t: f64) -> Rgb {
+        self.interpolant(triangle).evaluate(s, t)
+    }
+
+    /// Radiance that leaves a triangle at (s, t): ρE/π + Ke, W·sr⁻¹·m⁻².
+    pub fn radiance(&self, triangle: u32, s: f64, t: f64) -> Rgb {
+        let material = self.scene.material(self.triangles[triangle as usize].polygon);
+        self.irradiance(triangle, s, t) * material.reflectance / std::f64::consts::PI + material.radiance
+    }
+
+    /// The hierarchy over the triangles; a hit's id is the triangle.
+    pub fn bvh(&self) -> Bvh {
+        Bvh::of_triangles((0..self.triangles.len() as u32).map(|triangle| self.corners(triangle)).collect())
+    }
+
+    /// The triangle under a point, with the point's barycentrics: the nearest within `reach` metres along ±`normal`
+    /// whose own normal agrees with `normal`.
+    pub fn locate(&self, bvh: &Bvh, point: DVec3, normal: DVec3, reach: f64) -> Option<(u32, f64, f64)> {
+        let axis = normal.normalize_or_zero();
+        let mut best: Option<(f64, (u32, f64, f64))> = None;
+        let mut consider = |triangle: u32| {
+            let corners = self.corners(triangle);
+            let facing = (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalize_or_zero();
+            if facing.dot(axis) < 0.9 {
+                return;
+            }
+            let (s, t) = nearest_barycentrics(corners, point);
+            let nearest = corners[0] * (1.0 - s - t) + corners[1] * s + corners[2] * t;
+            let distance = nearest.distance(point);
+            if distance <= reach && best.is_none_or(|(d, (id, ..))| (distance, triangle) < (d, id)) {
+                best = Some((distance, (triangle, s, t)));
+            }
+        };
+        if axis != DVec3::ZERO {
+            // Three segments: a point on a border may be off its polygon by a rounding in the plane, too.
+            bvh.near_segment(point - axis * reach, point + axis * reach, &mut consider);
+            let across = axis.any_orthonormal_vector() * reach;
+            bvh.near_segment(point - across, point + across, &mut consider);
+            let along = axis.cross(across);
+            bvh.near_segment(point - along, point + along, &mut consider);
+        }
+        best.map(|(_, place)| place)
+    }
+
+    /// Checks every index and number; anything read from a file passes through here before it is used.
+    pub fn validate(&self) -> Result<(), SceneError> {
+        self.scene.validate()?;
+        let index = |what: &str, i: usize| Err(SceneError::Index(format!("{what} {i}")));
+        let number = |what: &str, i: usize| Err(SceneError::Number(format!("{what} {i}")));
+        let (vertices, samples) = (self.vertices.len() as u32, self.samples.len() as u32);
+        let (polygons, elements) = (self.scene.polygons.len() as u32, self.elements.len() as u32);
+        let lines = self.lines.len() as u32;
+        if let Some(i) = self.vertices.iter().position(|vertex| !vertex.is_finite()) {
+            return number("mesh vertex", i);
+        }
+        if let Some(i) = self.samples.iter().position(|sample| !sample.is_finite() || sample.min_element() < 0.0) {
+            return number("sample", i);
+        }
+        for (i, triangle) in self.triangles.iter().enumerate() {
+            let edges =
+                triangle.edges.iter().all(|edge| !matches!(edge, EdgeKind::Discontinuity(line) if *line >= lines));
+            if triangle.vertices.iter().any(|&vertex| vertex >= vertices)
+                || triangle.samples.iter().any(|&sample| sample >= samples)
+                || triangle.polygon >= polygons
+                || triangle.element >= elements
+                || !edges
+            {
+                return index("triangle", i);
+            }
+        }
+        if self.triangle_errors.len() != self.triangles.len() {
+            return index("triangle error", self.triangle_errors.len());
+        }
+        if let Some(i) = self.triangle_errors.iter().position(|error| !error.is_finite()) {
+            return number("triangle error", i);
+        }
+        for (i, element) in self.elements.iter().enumerate() {
+            if element.polygon >= polygons {
+                return index("element", i);
+            }
+            if !element.irradiance.is_finite() {
+                return number("element", i);
+            }
+        }
+        for (i, line) in self.lines.iter().enumerate() {
+            if line.receiver.max(line.source).max(line.blocker) >= polygons {
+                return index("discontinuity", i);
+            }
+            if !line.weight.is_finite() || !line.ends.iter().all(|end| end.is_finite()) {
+                return number("discontinuity", i);
+            }
+        }
+        Ok(())
+    }
+
+    /// Area-weighted mean irradiance over the mesh, W·m⁻², by the exact integral of each unclamped quadratic.
+    pub fn mean_irradiance(&self) -> Rgb {
+        let (mut sum, mut total) = (Rgb::ZERO, 0.0);
+        for triangle in 0..self.triangles.len() as u32 {
+            let [a, b, c] = self.corners(triangle);
+            let area = (b - a).cross(c - a).length() / 2.0;
+            // The integral of a quadratic over a triangle is the mean of its edge midpoints.
+            let middle = SAMPLE_BARYCENTRICS.iter().skip(1).step_by(2);
+            sum += middle.map(|&(s, t)| self.irradiance(triangle, s, t)).sum::<Rgb>() * (area / 3.0);
+            total += area;
+        }
+        if total > 0.0 { sum / total } else { Rgb::ZERO }
+    }
+
+    /// The radiance that a ray meets, or none where it leaves the scene; back sides are black.
+    pub fn radiance_along(&self, bvh: &Bvh, ray: &Ray) -> Option<Rgb> {
+        let hit = bvh.closest_hit(ray, 0.0)?;
+        let front = hit.normal.dot(ray.direction) < 0.0;
+        Some(if front { self.radiance(hit.id, hit.s, hit.t) } else { Rgb::ZERO })
+    }
+}
+
+/// Barycentrics (s, t) of the point of a triangle nearest to `point`.
+fn nearest_barycentrics([a, b, c]: [DVec3; 3], point: DVec3) -> (f64, f64) {
+    let (u, v, w) = (b - a, c - a, point - a);
+    let (uu, uv, vv, wu, wv) = (u.dot(u), u.dot(v), v.dot(v), w.dot(u), w.dot(v));
+    let determinant = uu * vv - uv * uv;
+    if determinant > 0.0 {
+        let (s, t) = ((wu * vv - wv * uv) / determinant, (wv * uu - wu * uv) / determinant);
+        if s >= 0.0 && t >= 0.0 && s + t <= 1.0 {
+            return (s, t);
+        }
+    }
+    // Outside: the nearest of the three edges' nearest points.
+    let along = |from: DVec3, to: DVec3| {
+        let edge = to - from;
+        let length = edge.length_squared();
+        if length > 0.0 { ((point - from).dot(edge) / length).clamp(0.0, 1.0) } else { 0.0 }
+    };
+    let (ab, bc, ca) = (along(a, b), along(b, c), along(c, a));
+    let candidates = [(ab, 0.0), (1.0 - bc, bc), (0.0, 1.0 - ca)];
+    let distance = |(s, t): (f64, f64)| (a + u * s + v * t).distance_squared(point);
+    candidates.into_iter().min_by(|x, y| distance(*x).total_cmp(&distance(*y))).unwrap_or((0.0, 0.0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nearest_barycentrics_clamps_to_the_triangle() {
+        let triangle = [DVec3::ZERO, DVec3::X, DVec3::Y];
+        assert_eq!(nearest_barycentrics(triangle, DVec3::new(0.25, 0.5, 7.0)), (0.25, 0.5));
+        assert_eq!(nearest_barycentrics(triangle, DVec3::new(-1.0, -1.0, 0.0)), (0.0, 0.0));
+        assert_eq!(nearest_barycentrics(triangle, DVec3::new(2.0, 2.0, 0.0)), (0.5, 0.5));
+        assert!(nearest_barycentrics([DVec3::ONE; 3], DVec3::ZERO).0.is_finite());
+    }
+}

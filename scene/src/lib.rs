@@ -1,0 +1,29 @@
+//! What a scene, a camera and a bake *are*, and what a ray meets.
+//!
+//! The shared vocabulary of Halflight: plain data that every other crate reads, and nothing of theirs.
+//! Lengths are metres, angles radians, radiance W·sr⁻¹·m⁻², irradiance, exitance and radiosity W·m⁻²,
+//! colours linear RGB.
+
+mod baked;
+mod bvh;
+mod camera;
+mod exposure;
+mod half_edge;
+mod interpolant;
+mod material;
+mod polygon;
+mod ray;
+mod rgb;
+mod scene;
+
+pub use baked::{Baked, BakedElement, BakedError, BakedTriangle, DiscontinuityLine, EdgeKind, LineKind, Provenance};
+pub use bvh::{Bvh, Hit};
+pub use camera::{Camera, NamedCamera};
+pub use exposure::{Exposure, encode_srgb, tone_curve};
+pub use half_edge::{HalfEdges, NO_TWIN};
+pub use interpolant::{Interpolant, SAMPLE_BARYCENTRICS};
+pub use material::Material;
+pub use polygon::{Plane, Polygon, area_vector, centroid, is_convex};
+pub use ray::{Ray, intersect_triangle};
+pub use rgb::{Rgb, luminance};
+pub use scene::{Scene, SceneError};

@@ -1,0 +1,146 @@
+//! A scene: polygons over shared vertices, their materials, and the cameras stored with them.
+
+use glam::DVec3;
+use serde::{Deserialize, Serialize};
+
+use crate::{Material, NamedCamera, Plane, Polygon, Rgb, area_vector};
+
+/// Largest coordinate accepted, metres. Beyond it f32 positions in a viewer would be off by more than a
+/// centimetre, and nobody models a room there on purpose: the units are wrong.
+const LARGEST_COORDINATE: f64 = 1e5;
+
+/// Polygons, materials and cameras; flat arrays that refer to each other by index.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Scene {
+    /// Welded positions, metres.
+    pub vertices: Vec<DVec3>,
+    /// Vertex ids of all polygons' corners, one polygon after another.
+    pub corners: Vec<u32>,
+    /// The polygons.
+    pub polygons: Vec<Polygon>,
+    /// What the polygons are made of.
+    pub materials: Vec<Material>,
+    /// Names of the objects (groups) that polygons belong to.
+    pub objects: Vec<String>,
+    /// Cameras stored with the scene; the first is the default one.
+    pub cameras: Vec<NamedCamera>,
+}
+
+/// What is wrong with a scene as data.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum SceneError {
+    /// An index points past the end of its array; the text says which.
+    Index(String),
+    /// A number is not finite or out of its range; the text says which.
+    Number(String),
+    /// A polygon has fewer than three corners or no area.
+    Degenerate {
+        /// The polygon.
+        polygon: u32,
+    },
+}
+
+impl std::fmt::Display for SceneError {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Index(what) => write!(f, "{what} points outside its table"),
+            Self::Number(what) => write!(f, "{what} is not finite or out of range"),
+            Self::Degenerate { polygon } => write!(f, "polygon {polygon} has no area"),
+        }
+    }
+}
+
+impl std::error::Error for SceneError {}
+
+impl Scene {
+    /// Corner positions of a polygon, counter-clockwise seen from its front.
+    pub fn outline(&self, polygon: u32) -> Vec<DVec3> {
+        self.corners[self.polygons[polygon as usize].corner_range()]
+            .iter()
+            .map(|&vertex| self.vertices[vertex as usize])
+            .collect()
+    }
+
+    /// The plane of a polygon; its normal points to the front.
+    pub fn plane(&self, polygon: u32) -> Plane {
+        Plane::through(&self.outline(polygon))
+    }
+
+    /// Area of a polygon, m².
+    pub fn area(&self, polygon: u32) -> f64 {
+        area_vector(&self.outline(polygon)).length()
+    }
+
+    /// The material of a polygon.
+    pub fn material(&self, polygon: u32) -> &Material {
+        &self.materials[self.polygons[polygon as usize].material as usize]
+    }
+
+    /// Ids of all polygons.
+    pub fn polygon_ids(&self) -> std::ops::Range<u32> {
+        0..self.polygons.len() as u32
+    }
+
+    /// Ids of the polygons that emit, in order.
+    pub fn emitters(&self) -> impl Iterator<Item = u32> {
+        self.polygon_ids().filter(|&polygon| self.material(polygon).emits())
+    }
+
+    /// Total emitted power, W.
+    pub fn power(&self) -> Rgb {
+        self.emitters().map(|polygon| self.material(polygon).exitance() * self.area(polygon)).sum()
+    }
+
+    /// Corners of the axis-aligned box around all polygons; both zero for an empty scene.
+    pub fn bounds(&self) -> (DVec3, DVec3) {
+        let used = || self.corners.iter().map(|&vertex| self.vertices[vertex as usize]);
+        match used().next() {
+            None => (DVec3::ZERO, DVec3::ZERO),
+            Some(first) => used().fold((first, first), |(low, high), p| (low.min(p), high.max(p))),
+        }
+    }
+
+    /// Length of the diagonal of [`Scene::bounds`], metres: the length that tolerances are fractions of.
+    pub fn size(&self) -> f64 {
+        let (low, high) = self.bounds();
+        (high - low).length()
+    }
+
+    /// Checks every index and number. Anything read from a file passes through here before it is used.
+    pub fn validate(&self) -> Result<(), SceneError> {
+        for (i, vertex) in self.vertices.iter().enumerate() {
+            if !vertex.is_finite() || vertex.abs().max_element() > LARGEST_COORDINATE {
+                return Err(SceneError::Number(format!("vertex {i}")));
+            }
+        }
+        if let Some(i) = self.corners.iter().position(|&vertex| vertex as usize >= self.vertices.len()) {
+            return Err(SceneError::Index(format!("corner {i}")));
+        }
+        for (i, material) in self.materials.iter().enumerate() {
+            let reflects = material.reflectance.is_finite()
+                && material.reflectance.min_element() >= 0.0
+                && material.reflectance.max_element() <= 1.0;
+            if !reflects || !material.radiance.is_finite() || material.radiance.min_element() < 0.0 {
+                return Err(SceneError::Number(format!("material {i} ({})", material.name)));
+            }
+        }
+        for (polygon, record) in (0..).zip(&self.polygons) {
+            let end = u64::from(record.first_corner) + u64::from(record.corner_count);
+            if end > self.corners.len() as u64
+                || record.material as usize >= self.materials.len()
+                || record.object as usize >= self.objects.len()
+            {
+                return Err(SceneError::Index(format!("polygon {polygon}")));
+            }
+            if record.corner_count < 3 || self.area(polygon) <= 0.0 {
+                return Err(SceneError::Degenerate { polygon });
+            }
+        }
+        for named in &self.cameras {
+            if !named.camera.is_valid() {
+                return Err(SceneError::Number(format!("camera {}", named.name)));
+            }
+        }
+        Ok(())
+    }
+}
