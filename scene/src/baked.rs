@@ -149,33 +149,10 @@ impl Baked {
         Bvh::of_triangles((0..self.triangles.len() as u32).map(|triangle| self.corners(triangle)).collect())
     }
 
-    /// The triangle under a point, with the point's barycentrics: the nearest within `reach` metres along ±`normal`
-    /// whose own normal agrees with `normal`.
+    /// The triangle under a point, with the point's barycentrics: the nearest within `reach` metres whose normal
+    /// agrees with `normal`. `bvh` is [`Baked::bvh`].
     pub fn locate(&self, bvh: &Bvh, point: DVec3, normal: DVec3, reach: f64) -> Option<(u32, f64, f64)> {
-        let axis = normal.normalize_or_zero();
-        let mut best: Option<(f64, (u32, f64, f64))> = None;
-        let mut consider = |triangle: u32| {
-            let corners = self.corners(triangle);
-            let facing = (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalize_or_zero();
-            if facing.dot(axis) < 0.9 {
-                return;
-            }
-            let (s, t) = nearest_barycentrics(corners, point);
-            let nearest = corners[0] * (1.0 - s - t) + corners[1] * s + corners[2] * t;
-            let distance = nearest.distance(point);
-            if distance <= reach && best.is_none_or(|(d, (id, ..))| (distance, triangle) < (d, id)) {
-                best = Some((distance, (triangle, s, t)));
-            }
-        };
-        if axis != DVec3::ZERO {
-            // Three segments: a point on a border may be off its polygon by a rounding in the plane, too.
-            bvh.near_segment(point - axis * reach, point + axis * reach, &mut consider);
-            let across = axis.any_orthonormal_vector() * reach;
-            bvh.near_segment(point - across, point + across, &mut consider);
-            let along = axis.cross(across);
-            bvh.near_segment(point - along, point + along, &mut consider);
-        }
-        best.map(|(_, place)| place)
+        bvh.nearest_surface(point, normal, reach).map(|hit| (hit.id, hit.s, hit.t))
     }
 
     /// Checks every index and number; anything read from a file passes through here before it is used.
@@ -248,42 +225,5 @@ impl Baked {
         let hit = bvh.closest_hit(ray, 0.0)?;
         let front = hit.normal.dot(ray.direction) < 0.0;
         Some(if front { self.radiance(hit.id, hit.s, hit.t) } else { Rgb::ZERO })
-    }
-}
-
-/// Barycentrics (s, t) of the point of a triangle nearest to `point`.
-fn nearest_barycentrics([a, b, c]: [DVec3; 3], point: DVec3) -> (f64, f64) {
-    let (u, v, w) = (b - a, c - a, point - a);
-    let (uu, uv, vv, wu, wv) = (u.dot(u), u.dot(v), v.dot(v), w.dot(u), w.dot(v));
-    let determinant = uu * vv - uv * uv;
-    if determinant > 0.0 {
-        let (s, t) = ((wu * vv - wv * uv) / determinant, (wv * uu - wu * uv) / determinant);
-        if s >= 0.0 && t >= 0.0 && s + t <= 1.0 {
-            return (s, t);
-        }
-    }
-    // Outside: the nearest of the three edges' nearest points.
-    let along = |from: DVec3, to: DVec3| {
-        let edge = to - from;
-        let length = edge.length_squared();
-        if length > 0.0 { ((point - from).dot(edge) / length).clamp(0.0, 1.0) } else { 0.0 }
-    };
-    let (ab, bc, ca) = (along(a, b), along(b, c), along(c, a));
-    let candidates = [(ab, 0.0), (1.0 - bc, bc), (0.0, 1.0 - ca)];
-    let distance = |(s, t): (f64, f64)| (a + u * s + v * t).distance_squared(point);
-    candidates.into_iter().min_by(|x, y| distance(*x).total_cmp(&distance(*y))).unwrap_or((0.0, 0.0))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn nearest_barycentrics_clamps_to_the_triangle() {
-        let triangle = [DVec3::ZERO, DVec3::X, DVec3::Y];
-        assert_eq!(nearest_barycentrics(triangle, DVec3::new(0.25, 0.5, 7.0)), (0.25, 0.5));
-        assert_eq!(nearest_barycentrics(triangle, DVec3::new(-1.0, -1.0, 0.0)), (0.0, 0.0));
-        assert_eq!(nearest_barycentrics(triangle, DVec3::new(2.0, 2.0, 0.0)), (0.5, 0.5));
-        assert!(nearest_barycentrics([DVec3::ONE; 3], DVec3::ZERO).0.is_finite());
     }
 }

@@ -14,6 +14,10 @@ use crate::{Ray, Scene, intersect_triangle};
 /// direction. Larger only costs time.
 const PADDING: f64 = 4e-6;
 
+/// Cosine of the largest angle at which a surface's normal agrees with a stated one: 25°, wide enough for a normal
+/// that was rounded or interpolated, far from that of the next face of a box.
+const AGREEMENT: f64 = 0.9;
+
 /// A hierarchy over triangles.
 pub struct Bvh {
     bvh: Bvh2,
@@ -111,13 +115,56 @@ impl Bvh {
         !missed
     }
 
-    /// Calls `visit` with the id of every triangle whose padded box a segment touches; for nearest-surface queries.
-    pub fn near_segment(&self, from: DVec3, to: DVec3, mut visit: impl FnMut(u32)) {
-        let ray = Ray { origin: from, direction: to - from };
-        self.bvh.ray_traverse_anyhit(library_ray(&ray, 1.0), |_, slot| {
-            visit(self.owners[self.bvh.primitive_indices[slot] as usize]);
+    /// The triangle nearest to a point, at most `reach` metres away, whose normal agrees with `normal`; the hit's
+    /// distance is in metres. Of two at the same distance the one with the smaller index wins.
+    pub fn nearest_surface(&self, point: DVec3, normal: DVec3, reach: f64) -> Option<Hit> {
+        let axis = normal.normalize_or_zero();
+        let mut best: Option<(usize, Hit)> = None;
+        let around = Aabb::new((point - reach).as_vec3a(), (point + reach).as_vec3a());
+        self.bvh.aabb_traverse(around, |bvh, node| {
+            let node = &bvh.nodes[node as usize];
+            let slots = node.first_index as usize..(node.first_index + node.prim_count) as usize;
+            for &index in &bvh.primitive_indices[slots] {
+                let index = index as usize;
+                let [a, b, c] = self.triangles[index];
+                let normal = (b - a).cross(c - a).normalize_or_zero();
+                if normal.dot(axis) < AGREEMENT {
+                    continue;
+                }
+                let (s, t) = nearest_barycentrics([a, b, c], point);
+                let distance = (a * (1.0 - s - t) + b * s + c * t).distance(point);
+                let nearer = |(other, hit): &(usize, Hit)| (distance, index) < (hit.distance, *other);
+                if distance <= reach && best.as_ref().is_none_or(nearer) {
+                    best = Some((index, Hit { id: self.owners[index], distance, s, t, normal }));
+                }
+            }
+            true
         });
+        best.map(|(_, hit)| hit)
     }
+}
+
+/// Barycentrics (s, t) of the point of a triangle nearest to `point`.
+fn nearest_barycentrics([a, b, c]: [DVec3; 3], point: DVec3) -> (f64, f64) {
+    let (u, v, w) = (b - a, c - a, point - a);
+    let (uu, uv, vv, wu, wv) = (u.dot(u), u.dot(v), v.dot(v), w.dot(u), w.dot(v));
+    let determinant = uu * vv - uv * uv;
+    if determinant > 0.0 {
+        let (s, t) = ((wu * vv - wv * uv) / determinant, (wv * uu - wu * uv) / determinant);
+        if s >= 0.0 && t >= 0.0 && s + t <= 1.0 {
+            return (s, t);
+        }
+    }
+    // Outside: the nearest of the three edges' nearest points.
+    let along = |from: DVec3, to: DVec3| {
+        let edge = to - from;
+        let length = edge.length_squared();
+        if length > 0.0 { ((point - from).dot(edge) / length).clamp(0.0, 1.0) } else { 0.0 }
+    };
+    let (ab, bc, ca) = (along(a, b), along(b, c), along(c, a));
+    let candidates = [(ab, 0.0), (1.0 - bc, bc), (0.0, 1.0 - ca)];
+    let distance = |(s, t): (f64, f64)| (a + u * s + v * t).distance_squared(point);
+    candidates.into_iter().min_by(|x, y| distance(*x).total_cmp(&distance(*y))).unwrap_or((0.0, 0.0))
 }
 
 fn library_ray(ray: &Ray, farthest: f32) -> obvhs::ray::Ray {
@@ -150,7 +197,7 @@ mod tests {
         };
         let point = |i: u32| DVec3::new(halton(i, 2), halton(i, 3), halton(i, 5));
         let triangles: Vec<_> =
-            (0..300).map(|i| [0, 1, 2].map(|k| point(4 * i + 1) + 0.6 * point(4 * i + 2 + k))).collect();
+            (0..300).map(|i| [0, 1, 2].map(|k| point(4 * i + 1) + 0.9 * point(4 * i + 2 + k))).collect();
         let bvh = Bvh::of_triangles(triangles.clone());
         let mut hits = 0;
         for i in 5000..6000 {
@@ -165,5 +212,31 @@ mod tests {
             hits += usize::from(nearest.is_some());
         }
         assert!(hits > 300, "only {hits} rays hit anything");
+    }
+
+    #[test]
+    fn nearest_barycentrics_clamps_to_the_triangle() {
+        let triangle = [DVec3::ZERO, DVec3::X, DVec3::Y];
+        assert_eq!(nearest_barycentrics(triangle, DVec3::new(0.25, 0.5, 7.0)), (0.25, 0.5));
+        assert_eq!(nearest_barycentrics(triangle, DVec3::new(-1.0, -1.0, 0.0)), (0.0, 0.0));
+        assert_eq!(nearest_barycentrics(triangle, DVec3::new(2.0, 2.0, 0.0)), (0.5, 0.5));
+        assert!(nearest_barycentrics([DVec3::ONE; 3], DVec3::ZERO).0.is_finite());
+    }
+
+    #[test]
+    fn the_nearest_surface_faces_the_right_way_and_lies_within_reach() {
+        let floor = [DVec3::ZERO, DVec3::X, DVec3::Y];
+        let ceiling = [DVec3::ZERO, DVec3::Y, DVec3::X];
+        let bvh = Bvh::of_triangles(vec![ceiling, floor, floor]);
+        let find = |point, normal, reach| bvh.nearest_surface(point, normal, reach).map(|hit| (hit.id, hit.s, hit.t));
+        assert_eq!(find(DVec3::new(0.25, 0.5, 1e-4), DVec3::Z, 1e-3), Some((1, 0.25, 0.5)));
+        assert_eq!(find(DVec3::new(0.25, 0.5, 1e-4), -DVec3::Z, 1e-3).map(|found| found.0), Some(0));
+        assert_eq!(find(DVec3::new(0.25, 0.5, 1e-2), DVec3::Z, 1e-3), None);
+        assert_eq!(find(DVec3::new(0.25, 0.5, 0.0), DVec3::X, 1e-3), None);
+        assert_eq!(find(DVec3::new(0.25, 0.5, 0.0), DVec3::ZERO, 1e-3), None);
+        assert_eq!(find(DVec3::NAN, DVec3::Z, 1e-3), None);
+        // Off the border, in the plane, in no direction in particular.
+        assert_eq!(find(DVec3::new(-5e-4, -4e-4, 0.0), DVec3::Z, 1e-3), Some((1, 0.0, 0.0)));
+        assert_eq!(Bvh::of_triangles(Vec::new()).nearest_surface(DVec3::ZERO, DVec3::Z, 1.0), None);
     }
 }
