@@ -1,1 +1,63 @@
-fn main() {}
+//! Halflight's command line: flags → validated options → one subcommand → one exit.
+//!
+//! Exit codes: 0 done, 1 failed, 2 wrong usage, 3 a comparison did not hold, 130 interrupted.
+
+mod args;
+mod bake;
+mod compare;
+mod failure;
+mod info;
+mod input;
+mod output;
+mod probe;
+mod progress;
+mod report;
+mod shot;
+mod view;
+
+use std::process::ExitCode;
+
+use anyhow::{Context, Result};
+use clap::Parser;
+
+use args::{Command, Flags};
+use failure::Outcome;
+use output::Outputs;
+use progress::say;
+
+fn main() -> ExitCode {
+    let flags = match Flags::try_parse() {
+        Ok(flags) => flags,
+        Err(error) if error.use_stderr() => {
+            say(error.to_string().trim_end());
+            return ExitCode::from(error.exit_code() as u8);
+        }
+        Err(help) => {
+            // To a closed pipe, too, help has been given.
+            _ = help.print();
+            return ExitCode::SUCCESS;
+        }
+    };
+    let result = run(flags.command);
+    if let Err(error) = &result {
+        say(format_args!("error: {error:#}"));
+    }
+    failure::exit_code(&result)
+}
+
+fn run(command: Command) -> Result<Outcome> {
+    let outputs = Outputs::default();
+    let held = outputs.clone();
+    ctrlc::set_handler(move || {
+        let _held = held.hold();
+        std::process::exit(failure::INTERRUPTED);
+    })
+    .context("cannot listen for Ctrl-C")?;
+    match command {
+        Command::Bake(flags) => bake::run(&flags, &outputs),
+        Command::Shot(flags) => shot::run(&flags, &outputs),
+        Command::View(flags) => view::run(&flags, &outputs),
+        Command::Probe(flags) => probe::run(&flags, &outputs),
+        Command::Info(flags) => info::run(&flags),
+    }
+}

@@ -1,0 +1,402 @@
+//! The command line: flags, and what makes them valid. Nothing here touches a file.
+
+use std::path::PathBuf;
+
+use anyhow::{Result, bail};
+use clap::builder::{PossibleValuesParser, TypedValueParser};
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use glam::DVec3;
+use scene::{Camera, Exposure};
+use viewer::Mode;
+
+use crate::failure::Usage;
+
+/// Largest side of a picture, pixels: what every GPU of the last ten years takes as a texture.
+const LARGEST_SIDE: u32 = 16_384;
+
+/// Largest exposure value of either sign: beyond it 2^EV leaves the numbers that a picture is made of.
+const LARGEST_EV: f64 = 64.0;
+
+/// Bakes light: diffuse global illumination as a piecewise-quadratic description on every surface.
+#[derive(Debug, Parser)]
+#[command(name = "halflight", version, infer_long_args = false, after_help = EXIT_CODES)]
+pub struct Flags {
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+const EXIT_CODES: &str = "Exit codes: 0 done, 1 failed, 2 wrong usage, 3 a comparison did not hold, 130 interrupted.";
+
+/// The subcommands, each in a file of its own.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Solve a scene's light and store it as a .hlf file
+    Bake(BakeFlags),
+    /// Draw a picture
+    Shot(ShotFlags),
+    /// Walk through the light in a window
+    View(ViewFlags),
+    /// Print the irradiance at points
+    Probe(ProbeFlags),
+    /// Print what a file holds
+    Info(InfoFlags),
+}
+
+/// `halflight bake`.
+#[derive(Debug, Args)]
+pub struct BakeFlags {
+    /// Scene to bake (OBJ)
+    pub scene: PathBuf,
+    /// Where the bake goes
+    #[arg(short, long, value_name = "OUT.hlf")]
+    pub output: PathBuf,
+    /// Options of the bake
+    #[command(flatten)]
+    pub options: LightFlags,
+    /// Print one JSON object on stdout: counts, seconds by stage, memory and measured error
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// What a bake's light depends on; none means the default of the stage that it belongs to.
+#[derive(Clone, Copy, Debug, Default, Args)]
+pub struct LightFlags {
+    /// Interreflections followed; 0 is direct light only [default: to convergence]
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
+    pub bounces: Option<u32>,
+    /// Largest number of discontinuities that one leaf follows (the paper's k)
+    #[arg(long, value_name = "K", allow_negative_numbers = true)]
+    pub discontinuities: Option<u32>,
+    /// Smallest weight, W/m², that a discontinuity must have to be followed (the paper's w_min)
+    #[arg(long, value_name = "W", value_parser = non_negative, allow_hyphen_values = true)]
+    pub min_weight: Option<f64>,
+    /// Irradiance, W/m², that one link may misplace [default: from the scene's mean irradiance]
+    #[arg(long, value_name = "E", value_parser = positive, allow_hyphen_values = true)]
+    pub link_error: Option<f64>,
+}
+
+/// `halflight shot`.
+#[derive(Debug, Args)]
+pub struct ShotFlags {
+    /// Bake to draw, or a scene, which is baked first
+    #[arg(value_name = "SCENE|OUT.hlf")]
+    pub input: PathBuf,
+    /// Where the picture goes; the name ends in .png (as displayed) or .exr (radiance, W/(sr m²))
+    #[arg(short, long, value_name = "IMAGE", value_parser = image_path)]
+    pub output: PathBuf,
+    /// The point of view
+    #[command(flatten)]
+    pub camera: CameraFlags,
+    /// Width and height of the picture, pixels
+    #[arg(long, value_name = "WxH", default_value = "640x480", value_parser = size, allow_hyphen_values = true)]
+    pub size: (u32, u32),
+    /// What is drawn
+    #[arg(long, default_value = "shaded", value_parser = mode())]
+    pub mode: Mode,
+    /// What draws; auto is the GPU where there is one
+    #[arg(long, value_enum, default_value_t = Backend::Auto)]
+    pub backend: Backend,
+    /// Exposure value, by which radiance is multiplied as 2^EV, or auto
+    #[arg(long, value_name = "EV|auto", default_value = "auto", value_parser = exposure, allow_hyphen_values = true)]
+    pub exposure: ExposureChoice,
+    /// Picture to compare with: an EXR by the relative RMSE of radiance, a PNG by the share of pixels off by more
+    /// than 1/255
+    #[arg(long, value_name = "REFERENCE", value_parser = image_path, requires = "max_error")]
+    pub compare: Option<PathBuf>,
+    /// Largest difference from the reference that is accepted; exit code 3 above it
+    #[arg(long, value_name = "E", value_parser = non_negative, requires = "compare", allow_hyphen_values = true)]
+    pub max_error: Option<f64>,
+    /// Print one JSON object on stdout
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Where a picture is taken from: nothing (the scene's first camera, or one that sees the whole scene), a camera
+/// of the scene by name, or a free one.
+#[derive(Clone, Debug, Default, Args)]
+pub struct CameraFlags {
+    /// A camera of the scene, by name
+    #[arg(long, value_name = "NAME", conflicts_with_all = ["eye", "target", "up", "fov"])]
+    pub camera: Option<String>,
+    /// Position of the eye, metres
+    #[arg(long, value_name = "X,Y,Z", value_parser = vector, requires = "target", allow_hyphen_values = true)]
+    pub eye: Option<DVec3>,
+    /// A point in the middle of the picture, metres
+    #[arg(long, value_name = "X,Y,Z", value_parser = vector, requires = "eye", allow_hyphen_values = true)]
+    pub target: Option<DVec3>,
+    /// A direction that points up in the picture [default: 0,0,1]
+    #[arg(long, value_name = "X,Y,Z", value_parser = vector, requires = "eye", allow_hyphen_values = true)]
+    pub up: Option<DVec3>,
+    /// Full vertical opening angle, degrees, between 0 and 180 [default: 60]
+    #[arg(long, value_name = "DEG", value_parser = opening_angle, requires = "eye", allow_hyphen_values = true)]
+    pub fov: Option<f64>,
+}
+
+/// `halflight view`.
+#[derive(Debug, Args)]
+pub struct ViewFlags {
+    /// Bake to walk through, or a scene, which is baked first
+    #[arg(value_name = "SCENE|OUT.hlf")]
+    pub input: PathBuf,
+    /// The first point of view
+    #[command(flatten)]
+    pub camera: CameraFlags,
+}
+
+/// `halflight probe`.
+#[derive(Debug, Args)]
+pub struct ProbeFlags {
+    /// Bake to probe, or a scene, which is baked first
+    #[arg(value_name = "SCENE|OUT.hlf")]
+    pub input: PathBuf,
+    /// Points and normals: a CSV file with the header x,y,z,nx,ny,nz
+    #[arg(long, value_name = "POINTS.csv")]
+    pub points: PathBuf,
+    /// Where the irradiance goes; stdout without it
+    #[arg(short, long, value_name = "OUT.csv")]
+    pub output: Option<PathBuf>,
+    /// How irradiance is found: the bake's interpolants, or an exact gather from the solution at each point
+    #[arg(long, value_enum, default_value_t = Method::Interpolant)]
+    pub method: Method,
+    /// Interreflections followed; 0 is direct light only [default: to convergence, or as a .hlf file was baked]
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
+    pub bounces: Option<u32>,
+}
+
+/// `halflight info`.
+#[derive(Debug, Args)]
+pub struct InfoFlags {
+    /// Bake or scene; a scene is described as it is, without a bake
+    #[arg(value_name = "SCENE|OUT.hlf")]
+    pub input: PathBuf,
+    /// Print one JSON object on stdout
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// What draws a picture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Backend {
+    /// The GPU where there is one, else the CPU.
+    Auto,
+    /// The GPU, or an error.
+    Gpu,
+    /// The CPU.
+    Cpu,
+}
+
+/// How `probe` finds irradiance.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Method {
+    /// The quadratic of the triangle under the point.
+    Interpolant,
+    /// Backprojection of every source at the point itself.
+    Gather,
+}
+
+/// A fixed exposure, or one metered from the picture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum ExposureChoice {
+    /// Metered.
+    Auto,
+    /// As given.
+    Fixed(Exposure),
+}
+
+/// The point of view that the camera flags ask for.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Viewpoint {
+    /// The scene's first camera.
+    Default,
+    /// A camera of the scene.
+    Named(String),
+    /// A camera of the user's own.
+    Free(Camera),
+}
+
+impl CameraFlags {
+    /// Checks that the four flags of a free camera make one.
+    pub fn viewpoint(&self) -> Result<Viewpoint> {
+        if let Some(name) = &self.camera {
+            return Ok(Viewpoint::Named(name.clone()));
+        }
+        let (Some(eye), Some(target)) = (self.eye, self.target) else { return Ok(Viewpoint::Default) };
+        if eye == target {
+            bail!(Usage("--eye and --target are the same point: move one, so that the view has a direction".into()));
+        }
+        let up = self.up.unwrap_or(DVec3::Z);
+        let camera = Camera { eye, target, up, vertical_fov: self.fov.unwrap_or(60.0).to_radians() };
+        if !camera.is_valid() {
+            bail!(Usage(format!(
+                "--up {},{},{} is zero or parallel to the view from --eye to --target: give one across it, such as \
+                 --up 0,1,0",
+                up.x, up.y, up.z
+            )));
+        }
+        Ok(Viewpoint::Free(camera))
+    }
+}
+
+fn number(text: &str) -> Result<f64, String> {
+    text.trim().parse().ok().filter(|value: &f64| value.is_finite()).ok_or_else(|| "must be a finite number".into())
+}
+
+fn non_negative(text: &str) -> Result<f64, String> {
+    let value = number(text)?;
+    if value >= 0.0 { Ok(value) } else { Err("must be 0 or more".into()) }
+}
+
+fn positive(text: &str) -> Result<f64, String> {
+    let value = number(text)?;
+    if value > 0.0 { Ok(value) } else { Err("must be more than 0".into()) }
+}
+
+fn opening_angle(text: &str) -> Result<f64, String> {
+    let value = number(text)?;
+    if value > 0.0 && value < 180.0 { Ok(value) } else { Err("must lie between 0 and 180 degrees".into()) }
+}
+
+fn vector(text: &str) -> Result<DVec3, String> {
+    let numbers: Vec<f64> = text.split(',').map(number).collect::<Result<_, _>>()?;
+    let [x, y, z] = numbers[..] else { return Err("must be three numbers with commas between, such as 1,2.5,-3".into()) };
+    Ok(DVec3::new(x, y, z))
+}
+
+fn size(text: &str) -> Result<(u32, u32), String> {
+    let side = |text: &str| text.parse().ok().filter(|side| (1..=LARGEST_SIDE).contains(side));
+    let sides = text.split_once(['x', 'X']).and_then(|(width, height)| Some((side(width)?, side(height)?)));
+    sides.ok_or_else(|| format!("must be two numbers of pixels between 1 and {LARGEST_SIDE}, such as 640x480"))
+}
+
+fn exposure(text: &str) -> Result<ExposureChoice, String> {
+    if text == "auto" {
+        return Ok(ExposureChoice::Auto);
+    }
+    match number(text) {
+        Ok(ev) if ev.abs() <= LARGEST_EV => Ok(ExposureChoice::Fixed(Exposure { ev: ev as f32 })),
+        _ => Err(format!("must be auto or a number between -{LARGEST_EV} and {LARGEST_EV}")),
+    }
+}
+
+fn image_path(text: &str) -> Result<PathBuf, String> {
+    let path = PathBuf::from(text);
+    match ImageKind::of(&path) {
+        Some(_) => Ok(path),
+        None => Err("the name must end in .png or .exr".into()),
+    }
+}
+
+fn mode() -> impl TypedValueParser<Value = Mode> {
+    PossibleValuesParser::new(Mode::ALL.map(Mode::name)).try_map(|text| text.parse::<Mode>())
+}
+
+/// A kind of picture file, by the end of its name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ImageKind {
+    /// What a display shows: 8 bits, sRGB.
+    Png,
+    /// Radiance, linear.
+    Exr,
+}
+
+impl ImageKind {
+    /// The kind that a file name says, if it is one of ours.
+    pub fn of(path: &std::path::Path) -> Option<Self> {
+        match path.extension()?.to_str()?.to_ascii_lowercase().as_str() {
+            "png" => Some(Self::Png),
+            "exr" => Some(Self::Exr),
+            _ => None,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use clap::CommandFactory;
+
+    use super::*;
+
+    fn refused(arguments: &[&str]) -> String {
+        let flags = Flags::try_parse_from([&["halflight"], arguments].concat());
+        let error = flags.expect_err(&format!("{arguments:?} was accepted"));
+        assert_eq!(error.exit_code(), 2, "{arguments:?}");
+        error.to_string()
+    }
+
+    fn shot(arguments: &[&str]) -> ShotFlags {
+        match Flags::try_parse_from([&["halflight", "shot", "a.hlf", "-o", "a.png"], arguments].concat()).unwrap().command
+        {
+            Command::Shot(flags) => flags,
+            other => unreachable!("{other:?}"),
+        }
+    }
+
+    #[test]
+    fn the_flags_are_consistent() {
+        Flags::command().debug_assert();
+    }
+
+    #[test]
+    fn what_cannot_be_is_refused_by_the_name_of_its_flag() {
+        for value in ["-1", "nan", "inf", "-inf", "1e999", "", "many"] {
+            for flag in ["--min-weight", "--link-error"] {
+                let message = refused(&["bake", "a.obj", "-o", "a.hlf", flag, value]);
+                assert!(message.contains(flag), "{message}");
+            }
+            let message = refused(&["shot", "a.hlf", "-o", "a.png", "--fov", value, "--eye", "0,0,0", "--target", "1,0,0"]);
+            assert!(message.contains("--fov"), "{message}");
+            let message = refused(&["shot", "a.hlf", "-o", "a.png", "--compare", "b.png", "--max-error", value]);
+            assert!(message.contains("--max-error"), "{message}");
+        }
+        assert!(refused(&["bake", "a.obj", "-o", "a.hlf", "--link-error", "0"]).contains("more than 0"));
+        for value in ["0x0", "640", "640x", "x480", "640x-480", "-640x480", "0x480", "99999x2", "1e3x1e3", "640x480x1"] {
+            assert!(refused(&["shot", "a.hlf", "-o", "a.png", "--size", value]).contains("640x480"));
+        }
+        for value in ["0", "180", "-60", "400"] {
+            let message = refused(&["shot", "a.hlf", "-o", "a.png", "--eye", "0,0,0", "--target", "1,0,0", "--fov", value]);
+            assert!(message.contains("between 0 and 180"), "{message}");
+        }
+        for value in ["1,2", "1,2,3,4", "1,2,nan", "a,b,c", ""] {
+            let message = refused(&["shot", "a.hlf", "-o", "a.png", "--target", "0,0,0", "--eye", value]);
+            assert!(message.contains("--eye"), "{message}");
+        }
+        for value in ["bright", "nan", "1e9"] {
+            assert!(refused(&["shot", "a.hlf", "-o", "a.png", "--exposure", value]).contains("--exposure"));
+        }
+        assert!(refused(&["shot", "a.hlf", "-o", "a.jpg"]).contains(".png or .exr"));
+        assert!(refused(&["shot", "a.hlf", "-o", "a.png", "--mode", "pretty"]).contains("shaded"));
+        assert!(refused(&["shot", "a.hlf", "-o", "a.png", "--eye", "0,0,0"]).contains("--target"));
+        assert!(refused(&["shot", "a.hlf", "-o", "a.png", "--compare", "b.png"]).contains("--max-error"));
+        assert!(refused(&["bake", "a.obj", "-o", "a.hlf", "--bounces", "-1"]).contains("--bounces"));
+        assert!(refused(&["bake", "a.obj"]).contains("--output"));
+        assert!(refused(&["bake", "a.obj", "-o", "a.hlf", "--tolerance", "0.01"]).contains("--tolerance"));
+    }
+
+    #[test]
+    fn a_free_camera_needs_a_direction_and_an_up_across_it() {
+        let usage = |arguments: &[&str]| {
+            let error = shot(arguments).camera.viewpoint().expect_err("no camera");
+            error.downcast_ref::<Usage>().expect("wrong usage").to_string()
+        };
+        assert!(usage(&["--eye", "1,2,3", "--target", "1,2,3"]).contains("--eye and --target"));
+        assert!(usage(&["--eye", "0,0,0", "--target", "0,0,5"]).contains("--up"));
+        assert!(usage(&["--eye", "0,0,0", "--target", "1,0,0", "--up", "0,0,0"]).contains("--up"));
+    }
+
+    #[test]
+    fn what_is_given_is_what_is_meant() {
+        let flags = shot(&["--eye", "-1,2,3", "--target", "-4, 5,6", "--fov", "90", "--size", "3X2", "--exposure", "-1.5"]);
+        let Viewpoint::Free(camera) = flags.camera.viewpoint().unwrap() else { unreachable!("a free camera") };
+        assert_eq!(camera.eye, DVec3::new(-1.0, 2.0, 3.0));
+        assert_eq!(camera.target, DVec3::new(-4.0, 5.0, 6.0));
+        assert_eq!(camera.up, DVec3::Z);
+        assert!((camera.vertical_fov - std::f64::consts::FRAC_PI_2).abs() < 1e-15);
+        assert_eq!(flags.size, (3, 2));
+        assert_eq!(flags.exposure, ExposureChoice::Fixed(Exposure { ev: -1.5 }));
+        assert_eq!(shot(&[]).camera.viewpoint().unwrap(), Viewpoint::Default);
+        assert_eq!(shot(&["--camera", "door"]).camera.viewpoint().unwrap(), Viewpoint::Named("door".into()));
+        assert_eq!(shot(&["--mode", "elements"]).mode, Mode::Elements);
+    }
+}
