@@ -197,11 +197,12 @@ mod tests {
         };
         let point = |i: u32| DVec3::new(halton(i, 2), halton(i, 3), halton(i, 5));
         let triangles: Vec<_> =
-            (0..300).map(|i| [0, 1, 2].map(|k| point(4 * i + 1) + 0.9 * point(4 * i + 2 + k))).collect();
+            (0..300).map(|i| [0, 1, 2].map(|k| point(4 * i + 1) + 0.6 * point(4 * i + 2 + k))).collect();
         let bvh = Bvh::of_triangles(triangles.clone());
         let mut hits = 0;
         for i in 5000..6000 {
-            let ray = Ray { origin: point(i) * 2.0 - 0.5, direction: point(i + 1000) - point(i) };
+            let origin = point(i) * 2.0 - 0.5;
+            let ray = Ray { origin, direction: point(i + 1000) * 1.5 - origin };
             let all =
                 triangles.iter().enumerate().filter_map(|(id, t)| Some((intersect_triangle(&ray, *t)?.0, id as u32)));
             let nearest = all.min_by(|a, b| a.0.total_cmp(&b.0));
