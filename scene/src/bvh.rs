@@ -115,6 +115,14 @@ impl Bvh {
         !missed
     }
 
+    /// Calls `visit` with the id of every triangle whose padded box a segment touches, in no particular order.
+    pub fn near_segment(&self, from: DVec3, to: DVec3, mut visit: impl FnMut(u32)) {
+        let ray = Ray { origin: from, direction: to - from };
+        self.bvh.ray_traverse_anyhit(library_ray(&ray, 1.0), |_, slot| {
+            visit(self.owners[self.bvh.primitive_indices[slot] as usize]);
+        });
+    }
+
     /// The triangle nearest to a point, at most `reach` metres away, whose normal agrees with `normal`; the hit's
     /// distance is in metres. Of two at the same distance the one with the smaller index wins.
     pub fn nearest_surface(&self, point: DVec3, normal: DVec3, reach: f64) -> Option<Hit> {
