@@ -5,7 +5,10 @@
 //! children are the patches, so that clusters between the root and the patches need no new kind of node.
 
 use glam::{DVec2, DVec3};
+use scene::{area_vector, centroid};
 use serde::{Deserialize, Serialize};
+
+use crate::clip::clip_convex;
 
 /// Index of a node in [`Elements::nodes`].
 pub type NodeId = u32;
@@ -108,5 +111,182 @@ impl Elements {
     /// The scene's polygon under a surface node; none for a cluster.
     pub fn polygon_of(&self, node: NodeId) -> Option<u32> {
         self.patch_of(node).map(|patch| self.patches[patch as usize].polygon)
+    }
+}
+
+/// A cell longer than this times its width is halved across its length alone. At 2 a child is never thinner than its
+/// parent.
+const LONG_CELL: f64 = 2.0;
+
+impl Elements {
+    /// One root cluster over patches without children. `pieces` are the convex pieces of every polygon of the scene,
+    /// polygon by polygon.
+    pub fn new(pieces: &[Vec<Vec<DVec3>>]) -> Self {
+        let count = pieces.iter().map(Vec::len).sum::<usize>() as u32;
+        let mut elements = Self::default();
+        elements.nodes.push(Node {
+            kind: NodeKind::Cluster,
+            parent: 0,
+            first_child: 1,
+            child_count: count,
+            first_corner: 0,
+            corner_count: 0,
+            area: 0.0,
+            centre: DVec3::ZERO,
+            cell_min: DVec2::ZERO,
+            cell_max: DVec2::ZERO,
+        });
+        for (polygon, pieces) in (0..).zip(pieces) {
+            for outline in pieces {
+                let (frame, cell) = Patch::around(polygon, elements.nodes.len() as u32, outline);
+                let patch = elements.patches.len() as u32;
+                elements.patches.push(frame);
+                elements.push_surface(0, patch, outline, DVec2::ZERO, cell);
+            }
+        }
+        let total: f64 = elements.nodes.iter().map(|node| node.area).sum();
+        let centre = elements.nodes.iter().map(|node| node.centre * node.area).sum::<DVec3>();
+        elements.nodes[0].area = total;
+        elements.nodes[0].centre = if total > 0.0 { centre / total } else { DVec3::ZERO };
+        elements
+    }
+
+    fn push_surface(&mut self, parent: NodeId, patch: u32, outline: &[DVec3], cell_min: DVec2, cell_max: DVec2) {
+        self.nodes.push(Node {
+            kind: NodeKind::Surface { patch },
+            parent,
+            first_child: 0,
+            child_count: 0,
+            first_corner: self.outlines.len() as u32,
+            corner_count: outline.len() as u32,
+            area: area_vector(outline).length(),
+            centre: centroid(outline),
+            cell_min,
+            cell_max,
+        });
+        self.outlines.extend_from_slice(outline);
+    }
+
+    /// Longer side of a surface node's cell, metres.
+    pub fn cell_length(&self, node: NodeId) -> f64 {
+        let node = &self.nodes[node as usize];
+        (node.cell_max - node.cell_min).max_element()
+    }
+
+    /// Divides a leaf into four, or into two across its length if it is long; children that the patch leaves empty
+    /// are omitted. Nothing happens to a node that has children already, and to clusters.
+    pub fn subdivide(&mut self, node: NodeId) {
+        let NodeKind::Surface { patch } = self.nodes[node as usize].kind else { return };
+        if self.nodes[node as usize].child_count > 0 {
+            return;
+        }
+        let Node { cell_min, cell_max, area, .. } = self.nodes[node as usize];
+        let (size, middle) = (cell_max - cell_min, (cell_min + cell_max) / 2.0);
+        let frame = self.patches[patch as usize];
+        let mut cells = vec![(self.outline(node).to_vec(), cell_min, cell_max)];
+        for (axis, index, split) in
+            [(frame.u, 0, size.x * LONG_CELL > size.y), (frame.v, 1, size.y * LONG_CELL > size.x)]
+        {
+            if !split {
+                continue;
+            }
+            let line = axis.dot(frame.origin) + middle[index];
+            let tolerance = size[index] * 1e-9;
+            cells = cells
+                .into_iter()
+                .flat_map(|(outline, low, high)| {
+                    let (mut below, mut above) = (Vec::new(), Vec::new());
+                    clip_convex(&outline, tolerance, |p| line - axis.dot(p), &mut below);
+                    clip_convex(&outline, tolerance, |p| axis.dot(p) - line, &mut above);
+                    let (mut end, mut start) = (high, low);
+                    end[index] = middle[index];
+                    start[index] = middle[index];
+                    [(below, low, end), (above, start, high)]
+                })
+                .collect();
+        }
+        let first_child = self.nodes.len() as u32;
+        // A sliver that rounding left over is not worth an element.
+        for (outline, low, high) in cells {
+            if area_vector(&outline).length() > area * 1e-9 {
+                self.push_surface(node, patch, &outline, low, high);
+            }
+        }
+        self.nodes[node as usize].first_child = first_child;
+        self.nodes[node as usize].child_count = self.nodes.len() as u32 - first_child;
+    }
+}
+
+impl Patch {
+    /// The frame along the longest edge of an outline, and the size of the bounding rectangle in it.
+    fn around(polygon: u32, root: NodeId, outline: &[DVec3]) -> (Self, DVec2) {
+        let normal = area_vector(outline).normalize_or_zero();
+        let mut longest = DVec3::ZERO;
+        for (i, &corner) in outline.iter().enumerate() {
+            let edge = outline[(i + 1) % outline.len()] - corner;
+            if edge.length_squared() > longest.length_squared() * (1.0 + 1e-9) {
+                longest = edge;
+            }
+        }
+        let u = longest.normalize_or_zero();
+        let v = normal.cross(u);
+        let project = |p: &DVec3| DVec2::new(u.dot(*p), v.dot(*p));
+        let low = outline.iter().map(project).fold(DVec2::INFINITY, DVec2::min);
+        let high = outline.iter().map(project).fold(DVec2::NEG_INFINITY, DVec2::max);
+        let depth = outline.first().map_or(0.0, |p| normal.dot(*p));
+        (Self { polygon, root, origin: u * low.x + v * low.y + normal * depth, u, v }, high - low)
+    }
+
+    /// Coordinates of a position in the patch's frame, metres.
+    pub fn coordinates(&self, position: DVec3) -> DVec2 {
+        let offset = position - self.origin;
+        DVec2::new(self.u.dot(offset), self.v.dot(offset))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn elements(outline: Vec<DVec3>) -> Elements {
+        Elements::new(&[vec![outline]])
+    }
+
+    #[test]
+    fn nothing_and_slivers() {
+        let mut empty = Elements::new(&[]);
+        empty.subdivide(0);
+        assert_eq!(empty.nodes.len(), 1);
+        let mut sliver =
+            elements([(0., 0.), (1e-3, 0.), (1e-3, 4.), (0., 4.)].map(|(x, y)| DVec3::new(x, y, 1.0)).to_vec());
+        for node in 1..9 {
+            sliver.subdivide(node);
+        }
+        assert!(
+            sliver
+                .leaves()
+                .all(|leaf| sliver.nodes[leaf as usize].cell_min.x == 0.0
+                    || sliver.nodes[leaf as usize].cell_min.y == 0.0)
+        );
+    }
+
+    #[test]
+    fn children_cover_their_parent() {
+        let hexagon =
+            (0..6).map(|i| DVec3::new((f64::from(i) * 1.04).cos() * 2.0, 0.3, -(f64::from(i) * 1.04).sin())).collect();
+        let mut elements = elements(hexagon);
+        for node in 1..60 {
+            elements.subdivide(node);
+            let sum: f64 = elements.children(node).map(|child| elements.nodes[child as usize].area).sum();
+            assert!((sum / elements.nodes[node as usize].area - 1.0).abs() < 1e-9);
+            for child in elements.children(node) {
+                let cell = elements.nodes[child as usize];
+                let patch = &elements.patches[0];
+                for corner in elements.outline(child) {
+                    let at = patch.coordinates(*corner);
+                    assert!((at.cmpge(cell.cell_min - 1e-12) & at.cmple(cell.cell_max + 1e-12)).all());
+                }
+            }
+        }
     }
 }

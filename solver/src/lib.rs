@@ -3,8 +3,25 @@
 //! The pipeline is [`solve`]: cut → refine (elements, links, blockers) → transport → reconstruct. What it returns,
 //! a [`Solution`], feeds [`Gather`], which answers with the irradiance at any surface point.
 
+mod backprojection;
+mod blocker;
+mod clip;
+mod contour;
 mod element;
+mod form_factor;
+mod geometry;
+mod irradiance;
+mod oracle;
+mod quadrature;
+mod reconstruct;
 mod solution;
+mod transport;
+mod validate;
 
 pub use element::{Elements, Node, NodeId, NodeKind, Patch};
-pub use solution::{BlockerLists, Cut, Interaction, Link, LinkSource, Solution, SolveOptions};
+pub use form_factor::{exchange, form_factor, form_factor_at, point_form_factor};
+pub use irradiance::{Contact, Gather, LeafGather};
+pub use solution::{
+    BlockerLists, Convergence, Cut, ElementLight, Interaction, Link, LinkSource, Solution, SolveOptions,
+};
+pub use validate::Validation;

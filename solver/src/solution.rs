@@ -1,21 +1,22 @@
 //! The solution: elements, links with their blockers, and the light on every node.
 
-use scene::Rgb;
+use glam::DVec3;
+use scene::{Rgb, Scene, luminance};
 use serde::{Deserialize, Serialize};
 
-use crate::{Elements, NodeId};
+use crate::{Elements, NodeId, Patch};
 
 /// What a solve is asked for.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct SolveOptions {
-    /// Irradiance that one link may misplace on its receiver, W·m⁻² (B·ΔF; Hanrahan et al. 1991). None derives it from
-    /// the scene's mean irradiance.
+    /// Irradiance that one link may misplace on its receiver, W·m⁻² (B·ΔF; Hanrahan et al. 1991). None takes
+    /// a fraction of the scene's mean irradiance.
     pub link_error: Option<f64>,
     /// Interreflections followed; 0 is direct light alone, none is all until the residual is reached.
     pub bounces: Option<u32>,
 }
 
-/// Where the light of a link comes from. Sky parts will stand beside nodes here.
+/// Where the light of a link comes from. Parts of the sky will stand beside nodes here.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum LinkSource {
     /// Another node of the hierarchy.
@@ -25,6 +26,8 @@ pub enum LinkSource {
 /// One receiver–source interaction.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Link {
+    /// The node that receives.
+    pub receiver: NodeId,
     /// Where the light comes from.
     pub source: LinkSource,
     /// Unoccluded form factor, receiver to source: the irradiance at the receiver is this × visibility × B.
@@ -36,12 +39,18 @@ pub struct Link {
 }
 
 /// Interned lists of blocking polygons; list 0 is empty.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct BlockerLists {
     /// First index and length of each list in `polygons`.
     pub lists: Vec<(u32, u32)>,
     /// Polygon ids, ascending within a list.
     pub polygons: Vec<u32>,
+}
+
+impl Default for BlockerLists {
+    fn default() -> Self {
+        Self { lists: vec![(0, 0)], polygons: Vec::new() }
+    }
 }
 
 impl BlockerLists {
@@ -50,6 +59,20 @@ impl BlockerLists {
         let (first, length) = self.lists[list as usize];
         &self.polygons[first as usize..(first + length) as usize]
     }
+
+    /// Memory that the lists take, bytes.
+    pub fn bytes(&self) -> usize {
+        std::mem::size_of_val(self.lists.as_slice()) + std::mem::size_of_val(self.polygons.as_slice())
+    }
+}
+
+/// A contact or intersection line on a polygon: the segment where another polygon meets it.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Cut {
+    /// Ends, metres.
+    pub ends: [DVec3; 2],
+    /// The polygon that meets it there.
+    pub other: u32,
 }
 
 /// Everything that is known of one source's light on one receiving polygon, over all their links.
@@ -63,13 +86,37 @@ pub struct Interaction {
     pub blockers: Vec<u32>,
 }
 
-/// A contact or intersection line on a polygon: the segment where another polygon meets it.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Cut {
-    /// Ends, metres.
-    pub ends: [glam::DVec3; 2],
-    /// The polygon that meets it there.
-    pub other: u32,
+/// The irradiance that a node reflects, linear over the node.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct ElementLight {
+    /// At the node's centre, W·m⁻²; also the mean over the node.
+    pub irradiance: Rgb,
+    /// Change per metre along the patch's u, W·m⁻³.
+    pub gradient_u: Rgb,
+    /// Change per metre along the patch's v, W·m⁻³.
+    pub gradient_v: Rgb,
+    /// How far the light of the leaves below strays from this plane, luminance, W·m⁻²; 0 for a leaf.
+    pub deviation: f64,
+}
+
+impl ElementLight {
+    /// The irradiance at a position of the node, never negative; `centre` is the node's.
+    pub fn at(&self, patch: &Patch, centre: DVec3, position: DVec3) -> Rgb {
+        let offset = position - centre;
+        let linear = self.gradient_u * patch.u.dot(offset) + self.gradient_v * patch.v.dot(offset);
+        (self.irradiance + linear).max(Rgb::ZERO)
+    }
+}
+
+/// How the iteration of the transport ended.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Convergence {
+    /// Gathers over all links.
+    pub iterations: u32,
+    /// Power that the last gather still moved, as a fraction of the power that leaves all surfaces.
+    pub residual: f64,
+    /// Whether the residual asked for, or the number of bounces asked for, was reached.
+    pub reached: bool,
 }
 
 /// The solved scene.
@@ -79,11 +126,114 @@ pub struct Solution {
     pub elements: Elements,
     /// Contact and intersection lines, per polygon of the scene.
     pub cuts: Vec<Vec<Cut>>,
+    /// First patch of each polygon, and the number of patches at the end.
+    pub first_patch: Vec<u32>,
+    /// All links, by receiver.
+    pub links: Vec<Link>,
+    /// First link of each node, and the number of links at the end.
+    pub first_link: Vec<u32>,
+    /// The links' blockers.
+    pub blockers: BlockerLists,
+    /// Mean irradiance of each node, W·m⁻².
+    pub irradiance: Vec<Rgb>,
+    /// The irradiance that each node reflects: one bounce less than [`Solution::irradiance`].
+    pub light: Vec<ElementLight>,
+    /// Area-weighted mean irradiance of all surfaces, W·m⁻².
+    pub mean_irradiance: Rgb,
+    /// How the iteration ended.
+    pub convergence: Convergence,
+    /// The link error that was used, W·m⁻².
+    pub link_error: f64,
+    /// Interreflections followed, none for all.
+    pub bounces: Option<u32>,
 }
 
 impl Solution {
-    /// The light that reaches a polygon, by source, ascending in the source's id.
-    pub fn interactions(&self, _receiver: u32) -> Vec<Interaction> {
-        unimplemented!()
+    /// The links through which a node receives.
+    pub fn links_of(&self, node: NodeId) -> &[Link] {
+        &self.links[self.first_link[node as usize] as usize..self.first_link[node as usize + 1] as usize]
+    }
+
+    /// Root nodes of a polygon's patches, in order.
+    pub fn patch_roots(&self, polygon: u32) -> impl Iterator<Item = NodeId> {
+        let range = self.first_patch[polygon as usize]..self.first_patch[polygon as usize + 1];
+        range.map(|patch| self.elements.patches[patch as usize].root)
+    }
+
+    /// Whether a polygon was not cut.
+    pub fn is_one_patch(&self, polygon: u32) -> bool {
+        self.first_patch[polygon as usize] + 1 == self.first_patch[polygon as usize + 1]
+    }
+
+    /// Leaf elements of a polygon, patch by patch.
+    pub fn leaves_of(&self, polygon: u32) -> Vec<NodeId> {
+        let mut leaves = Vec::new();
+        for root in self.patch_roots(polygon) {
+            self.leaves_below(root, &mut leaves);
+        }
+        leaves
+    }
+
+    fn leaves_below(&self, node: NodeId, leaves: &mut Vec<NodeId>) {
+        if self.elements.is_leaf(node) {
+            leaves.push(node);
+        }
+        for child in self.elements.children(node) {
+            self.leaves_below(child, leaves);
+        }
+    }
+
+    /// Whether light is reflected at all: not when direct light alone was asked for.
+    pub fn reflects(&self) -> bool {
+        self.bounces != Some(0)
+    }
+
+    /// The irradiance that a leaf reflects at a position on it, W·m⁻².
+    pub fn reflected_irradiance(&self, leaf: NodeId, position: DVec3) -> Rgb {
+        let light = &self.light[leaf as usize];
+        match self.elements.patch_of(leaf) {
+            Some(patch) => {
+                let patch = &self.elements.patches[patch as usize];
+                light.at(patch, self.elements.nodes[leaf as usize].centre, position)
+            }
+            None => light.irradiance,
+        }
+    }
+
+    /// Radiosity ρE + π·Ke of a surface node as a source, W·m⁻².
+    pub fn radiosity(&self, scene: &Scene, node: NodeId) -> Rgb {
+        let Some(polygon) = self.elements.polygon_of(node) else { return Rgb::ZERO };
+        let material = scene.material(polygon);
+        let reflected =
+            if self.reflects() { material.reflectance * self.light[node as usize].irradiance } else { Rgb::ZERO };
+        reflected + material.exitance()
+    }
+
+    /// The light that reaches a polygon, one entry for each source polygon, ascending.
+    pub fn interactions(&self, scene: &Scene, receiver: u32) -> Vec<Interaction> {
+        let mut pairs: Vec<(u32, u32)> = Vec::new(); // (source, blocker)
+        let mut brightest: Vec<(u32, f64)> = Vec::new();
+        let mut open: Vec<NodeId> = self.patch_roots(receiver).collect();
+        while let Some(node) = open.pop() {
+            open.extend(self.elements.children(node));
+            for link in self.links_of(node) {
+                let LinkSource::Node(source) = link.source;
+                let Some(polygon) = self.elements.polygon_of(source) else { continue };
+                brightest.push((polygon, luminance(self.radiosity(scene, source))));
+                pairs.extend(self.blockers.get(link.blockers).iter().map(|&blocker| (polygon, blocker)));
+            }
+        }
+        pairs.sort_unstable();
+        pairs.dedup();
+        brightest.sort_unstable_by(|a, b| a.0.cmp(&b.0).then(b.1.total_cmp(&a.1)));
+        brightest.dedup_by_key(|entry| entry.0);
+        brightest
+            .into_iter()
+            .map(|(source, radiosity)| {
+                let first = pairs.partition_point(|pair| pair.0 < source);
+                let end = pairs.partition_point(|pair| pair.0 <= source);
+                Interaction { source, radiosity, blockers: pairs[first..end].iter().map(|pair| pair.1).collect() }
+            })
+            .collect()
     }
 }

@@ -1,0 +1,106 @@
+//! Invariants of a solution that hold whatever the scene: reciprocity, closure, energy, coverage.
+
+use std::collections::HashMap;
+
+use scene::{Rgb, Scene};
+
+use crate::{LinkSource, NodeId, Solution};
+
+/// What a solution was measured to violate. All zero for a perfect one.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Validation {
+    /// Largest |A_i F_ij − A_j F_ji| over pairs of patches, visibility included, as a fraction of the smaller of the
+    /// two areas.
+    pub reciprocity: f64,
+    /// Largest |1 − Σ F| over the patches, area-weighted over each; in a closed room the form factors from a patch
+    /// to everything that it sees add up to 1. Patches that see nothing (faces in contact) are left out.
+    pub closure: f64,
+    /// The same, weighted by area over all patches.
+    pub mean_closure: f64,
+    /// |emitted − absorbed| ÷ emitted power, largest over the colours; 0 only in a closed room without bounce limit.
+    pub energy: f64,
+    /// Pairs of a leaf and a source point that are linked more than once: a node linked both itself and through an
+    /// ancestor.
+    pub doubled_links: u32,
+    /// Numbers that are not finite or out of their range: form factors, visibilities, irradiances.
+    pub bad_numbers: u32,
+}
+
+impl Solution {
+    /// Measures how well the solution keeps the laws it must obey.
+    pub fn validate(&self, scene: &Scene) -> Validation {
+        let elements = &self.elements;
+        // Σ over links of A_receiver · F · V, by receiving and sending patch.
+        let mut exchanged: HashMap<(u32, u32), f64> = HashMap::new();
+        let mut result = Validation::default();
+        for link in &self.links {
+            let LinkSource::Node(source) = link.source;
+            let transfer = link.form_factor * link.visibility;
+            if !(0.0..=1.0 + 1e-9).contains(&link.form_factor) || !(0.0..=1.0).contains(&link.visibility) {
+                result.bad_numbers += 1;
+            }
+            if let (Some(to), Some(from)) = (elements.patch_of(link.receiver), elements.patch_of(source)) {
+                *exchanged.entry((to, from)).or_default() += transfer * elements.nodes[link.receiver as usize].area;
+            }
+        }
+        result.bad_numbers += self.irradiance.iter().filter(|e| !e.is_finite() || e.min_element() < 0.0).count() as u32;
+        let area = |patch: u32| elements.nodes[elements.patches[patch as usize].root as usize].area;
+        let mut sums = vec![0.0; elements.patches.len()];
+        let mut ordered: Vec<_> = exchanged.iter().collect();
+        ordered.sort_unstable_by_key(|entry| entry.0);
+        for (&(to, from), &there) in ordered {
+            let back = exchanged.get(&(from, to)).copied().unwrap_or(0.0);
+            result.reciprocity = result.reciprocity.max((there - back).abs() / area(to).min(area(from)));
+            sums[to as usize] += there;
+        }
+        let (mut weighted, mut total) = (0.0, 0.0);
+        for (patch, &sum) in (0..).zip(&sums) {
+            if sum > 0.0 {
+                let defect = (1.0 - sum / area(patch)).abs();
+                result.closure = result.closure.max(defect);
+                weighted += defect * area(patch);
+                total += area(patch);
+            }
+        }
+        result.mean_closure = if total > 0.0 { weighted / total } else { 0.0 };
+        result.energy = self.energy_defect(scene);
+        result.doubled_links = self.doubled_links();
+        result
+    }
+
+    fn energy_defect(&self, scene: &Scene) -> f64 {
+        let (mut emitted, mut absorbed) = (Rgb::ZERO, Rgb::ZERO);
+        for leaf in self.elements.leaves() {
+            let Some(polygon) = self.elements.polygon_of(leaf) else { continue };
+            let (material, area) = (scene.material(polygon), self.elements.nodes[leaf as usize].area);
+            emitted += material.exitance() * area;
+            absorbed += (Rgb::ONE - material.reflectance) * self.irradiance[leaf as usize] * area;
+        }
+        (emitted - absorbed).abs().max_element() / emitted.max_element().max(f64::MIN_POSITIVE)
+    }
+
+    /// Links whose receiver and source both lie below, or at, those of another link.
+    fn doubled_links(&self) -> u32 {
+        let pair = |link: &crate::Link| {
+            let LinkSource::Node(source) = link.source;
+            (link.receiver, source)
+        };
+        let mut count: HashMap<(NodeId, NodeId), u32> = HashMap::new();
+        for link in &self.links {
+            *count.entry(pair(link)).or_default() += 1;
+        }
+        let parent = |node: NodeId| self.elements.nodes[node as usize].parent;
+        let ancestors =
+            |node: NodeId| std::iter::successors(Some(node), move |&node| (parent(node) != node).then(|| parent(node)));
+        let mut doubled = 0;
+        for link in &self.links {
+            let (receiver, source) = pair(link);
+            let above = ancestors(receiver)
+                .flat_map(|receiver| ancestors(source).map(move |source| (receiver, source)))
+                .map(|pair| count.get(&pair).copied().unwrap_or(0))
+                .sum::<u32>();
+            doubled += u32::from(above > 1);
+        }
+        doubled
+    }
+}
