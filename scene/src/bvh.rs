@@ -83,11 +83,15 @@ impl Bvh {
     /// Of two at the same distance the one with the smaller index wins, so that the answer does not depend on
     /// the order of traversal.
     pub fn closest_hit(&self, ray: &Ray, nearest: f64) -> Option<Hit> {
+        self.closest(ray, |_, distance| distance > nearest)
+    }
+
+    fn closest(&self, ray: &Ray, accept: impl Fn(u32, f64) -> bool) -> Option<Hit> {
         let mut best: Option<(f64, usize, f64, f64)> = None;
         self.bvh.ray_traverse(library_ray(ray, f32::INFINITY), &mut RayHit::none(), |_, slot| {
             let index = self.bvh.primitive_indices[slot] as usize;
             match intersect_triangle(ray, self.triangles[index]) {
-                Some((distance, s, t)) if distance > nearest => {
+                Some((distance, s, t)) if accept(self.owners[index], distance) => {
                     if best.is_none_or(|(d, i, ..)| distance < d || (distance == d && index < i)) {
                         best = Some((distance, index, s, t));
                     }
@@ -105,14 +109,29 @@ impl Bvh {
 
     /// Whether anything lies between two points, ends excluded by `margin` (a fraction of the distance).
     pub fn is_blocked(&self, from: DVec3, to: DVec3, margin: f64) -> bool {
+        self.blocked(from, to, |_, distance| distance > margin && distance < 1.0 - margin)
+    }
+
+    fn blocked(&self, from: DVec3, to: DVec3, accept: impl Fn(u32, f64) -> bool) -> bool {
         let ray = Ray { origin: from, direction: to - from };
         let hits = |slot: usize| {
-            let triangle = self.triangles[self.bvh.primitive_indices[slot] as usize];
-            intersect_triangle(&ray, triangle).is_some_and(|(d, ..)| d > margin && d < 1.0 - margin)
+            let index = self.bvh.primitive_indices[slot] as usize;
+            intersect_triangle(&ray, self.triangles[index]).is_some_and(|(d, ..)| accept(self.owners[index], d))
         };
         let missed =
             self.bvh.ray_traverse_miss(library_ray(&ray, 1.0), |_, slot| if hits(slot) { 0.5 } else { f32::INFINITY });
         !missed
+    }
+
+    /// The nearest triangle that the ray meets, from either side, among those whose id `accept` takes: without the
+    /// polygon that the ray starts on, say, where no margin would do.
+    pub fn closest_hit_among(&self, ray: &Ray, accept: impl Fn(u32) -> bool) -> Option<Hit> {
+        self.closest(ray, |id, _| accept(id))
+    }
+
+    /// Whether anything whose id `accept` takes lies strictly between two points.
+    pub fn is_blocked_among(&self, from: DVec3, to: DVec3, accept: impl Fn(u32) -> bool) -> bool {
+        self.blocked(from, to, |id, distance| distance < 1.0 && accept(id))
     }
 
     /// Calls `visit` with the id of every triangle whose padded box a segment touches, in no particular order.
@@ -218,6 +237,13 @@ mod tests {
             assert_eq!(hit.map(|hit| (hit.distance, hit.id)), nearest);
             let blocked = nearest.is_some_and(|(distance, _)| distance < 1.0);
             assert_eq!(bvh.is_blocked(ray.origin, ray.at(1.0), 0.0), blocked);
+            if let Some(nearest) = nearest {
+                let others = |id| id != nearest.1;
+                let second = bvh.closest_hit(&ray, nearest.0);
+                assert_eq!(bvh.closest_hit_among(&ray, others), second);
+                let blocked = second.is_some_and(|hit| hit.distance < 1.0);
+                assert_eq!(bvh.is_blocked_among(ray.origin, ray.at(1.0), others), blocked);
+            }
             hits += usize::from(nearest.is_some());
         }
         assert!(hits > 300, "only {hits} rays hit anything");
