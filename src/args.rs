@@ -7,6 +7,7 @@ use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use glam::DVec3;
 use scene::{Camera, Exposure};
+use serde::Serialize;
 use viewer::Mode;
 
 use crate::failure::Usage;
@@ -51,16 +52,16 @@ pub struct BakeFlags {
     /// Where the bake goes
     #[arg(short, long, value_name = "OUT.hlf")]
     pub output: PathBuf,
-    /// Options of the bake
+    /// What the light is asked for
     #[command(flatten)]
-    pub options: LightFlags,
+    pub light: LightFlags,
     /// Print one JSON object on stdout: counts, seconds by stage, memory and measured error
     #[arg(long)]
     pub json: bool,
 }
 
 /// What a bake's light depends on; none means the default of the stage that it belongs to.
-#[derive(Clone, Copy, Debug, Default, Args)]
+#[derive(Clone, Copy, Debug, Default, Args, Serialize)]
 pub struct LightFlags {
     /// Interreflections followed; 0 is direct light only [default: to convergence]
     #[arg(long, value_name = "N", allow_negative_numbers = true)]
@@ -259,7 +260,9 @@ fn opening_angle(text: &str) -> Result<f64, String> {
 
 fn vector(text: &str) -> Result<DVec3, String> {
     let numbers: Vec<f64> = text.split(',').map(number).collect::<Result<_, _>>()?;
-    let [x, y, z] = numbers[..] else { return Err("must be three numbers with commas between, such as 1,2.5,-3".into()) };
+    let [x, y, z] = numbers[..] else {
+        return Err("must be three numbers with commas between, such as 1,2.5,-3".into());
+    };
     Ok(DVec3::new(x, y, z))
 }
 
@@ -326,7 +329,9 @@ mod tests {
     }
 
     fn shot(arguments: &[&str]) -> ShotFlags {
-        match Flags::try_parse_from([&["halflight", "shot", "a.hlf", "-o", "a.png"], arguments].concat()).unwrap().command
+        match Flags::try_parse_from([&["halflight", "shot", "a.hlf", "-o", "a.png"], arguments].concat())
+            .unwrap()
+            .command
         {
             Command::Shot(flags) => flags,
             other => unreachable!("{other:?}"),
@@ -345,17 +350,20 @@ mod tests {
                 let message = refused(&["bake", "a.obj", "-o", "a.hlf", flag, value]);
                 assert!(message.contains(flag), "{message}");
             }
-            let message = refused(&["shot", "a.hlf", "-o", "a.png", "--fov", value, "--eye", "0,0,0", "--target", "1,0,0"]);
+            let message =
+                refused(&["shot", "a.hlf", "-o", "a.png", "--fov", value, "--eye", "0,0,0", "--target", "1,0,0"]);
             assert!(message.contains("--fov"), "{message}");
             let message = refused(&["shot", "a.hlf", "-o", "a.png", "--compare", "b.png", "--max-error", value]);
             assert!(message.contains("--max-error"), "{message}");
         }
         assert!(refused(&["bake", "a.obj", "-o", "a.hlf", "--link-error", "0"]).contains("more than 0"));
-        for value in ["0x0", "640", "640x", "x480", "640x-480", "-640x480", "0x480", "99999x2", "1e3x1e3", "640x480x1"] {
+        for value in ["0x0", "640", "640x", "x480", "640x-480", "-640x480", "0x480", "99999x2", "1e3x1e3", "640x480x1"]
+        {
             assert!(refused(&["shot", "a.hlf", "-o", "a.png", "--size", value]).contains("640x480"));
         }
         for value in ["0", "180", "-60", "400"] {
-            let message = refused(&["shot", "a.hlf", "-o", "a.png", "--eye", "0,0,0", "--target", "1,0,0", "--fov", value]);
+            let message =
+                refused(&["shot", "a.hlf", "-o", "a.png", "--eye", "0,0,0", "--target", "1,0,0", "--fov", value]);
             assert!(message.contains("between 0 and 180"), "{message}");
         }
         for value in ["1,2", "1,2,3,4", "1,2,nan", "a,b,c", ""] {
@@ -387,7 +395,8 @@ mod tests {
 
     #[test]
     fn what_is_given_is_what_is_meant() {
-        let flags = shot(&["--eye", "-1,2,3", "--target", "-4, 5,6", "--fov", "90", "--size", "3X2", "--exposure", "-1.5"]);
+        let flags =
+            shot(&["--eye", "-1,2,3", "--target", "-4, 5,6", "--fov", "90", "--size", "3X2", "--exposure", "-1.5"]);
         let Viewpoint::Free(camera) = flags.camera.viewpoint().unwrap() else { unreachable!("a free camera") };
         assert_eq!(camera.eye, DVec3::new(-1.0, 2.0, 3.0));
         assert_eq!(camera.target, DVec3::new(-4.0, 5.0, 6.0));

@@ -30,3 +30,39 @@ pub fn exit_code(result: &anyhow::Result<Outcome>) -> ExitCode {
         Ok(Outcome::Differs) => 3,
     })
 }
+
+/// The whole chain of causes in one line. Some errors say their cause themselves; it is not said twice.
+pub fn sentence(error: &anyhow::Error) -> String {
+    error.chain().map(ToString::to_string).fold(String::new(), |said, cause| match said.as_str() {
+        "" => cause,
+        _ if said.contains(&cause) => said,
+        _ => format!("{said}: {cause}"),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use anyhow::anyhow;
+
+    use super::*;
+
+    #[test]
+    fn every_end_has_its_code() {
+        let code = |result: anyhow::Result<Outcome>| format!("{:?}", exit_code(&result));
+        let expected = |code: u8| format!("{:?}", ExitCode::from(code));
+        assert_eq!(code(Ok(Outcome::Done)), expected(0));
+        assert_eq!(code(Err(anyhow!("no room"))), expected(1));
+        assert_eq!(code(Err(Usage("--eye".into()).into())), expected(2));
+        assert_eq!(code(Ok(Outcome::Differs)), expected(3));
+    }
+
+    #[test]
+    fn a_cause_is_said_once() {
+        let cause = anyhow!("no room");
+        assert_eq!(
+            sentence(&cause.context("a.hlf: no room; make some").context("bake")),
+            "bake: a.hlf: no room; make some"
+        );
+        assert_eq!(sentence(&anyhow!("no room").context("a.hlf")), "a.hlf: no room");
+    }
+}

@@ -9,6 +9,7 @@ mod failure;
 mod info;
 mod input;
 mod output;
+mod pipeline;
 mod probe;
 mod progress;
 mod report;
@@ -40,7 +41,7 @@ fn main() -> ExitCode {
     };
     let result = run(flags.command);
     if let Err(error) = &result {
-        say(format_args!("error: {error:#}"));
+        say(format_args!("error: {}", failure::sentence(error)));
     }
     failure::exit_code(&result)
 }

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use anyhow::{Context, Result, ensure};
+use formats::FormatError;
 
 /// The files being written. Whoever ends the program early takes [`Outputs::hold`] first, and so leaves no temporary
 /// file behind: files are made under a temporary name and renamed, in one go, while the lock is held.
@@ -17,23 +18,22 @@ pub struct Output {
 }
 
 impl Outputs {
-    /// Checks that a file can be made at `path`, without making it.
+    /// Checks that `path` can be written to, without writing.
     pub fn claim(&self, path: &Path) -> Result<Output> {
-        // Renaming over a device or a pipe would replace it; a folder cannot be replaced.
-        ensure!(
-            !path.exists() || path.is_file(),
-            "cannot write {}: it exists and is not a regular file; name another",
-            path.display()
-        );
-        let folder = match path.parent() {
-            Some(folder) if folder != Path::new("") => folder,
-            _ => Path::new("."),
-        };
-        ensure!(path.file_name().is_some(), "cannot write {}: it names no file", path.display());
-        // Nameless where the system can, so that not even a crash leaves it.
-        tempfile::tempfile_in(folder).with_context(|| {
-            format!("cannot write {}: make the folder {}, or name another", path.display(), folder.display())
-        })?;
+        ensure!(!path.is_dir(), "{}: is a folder and cannot be written; name a file in it", path.display());
+        ensure!(path.file_name().is_some(), "{}: names no file to write; give one", path.display());
+        // A link is written through; a device is written to and makes no file.
+        let target = path.canonicalize().unwrap_or_else(|_| path.to_owned());
+        if !target.exists() || target.is_file() {
+            let folder = match target.parent() {
+                Some(folder) if folder != Path::new("") => folder,
+                _ => Path::new("."),
+            };
+            // Nameless where the system can, so that not even a crash leaves it.
+            tempfile::tempfile_in(folder).with_context(|| {
+                format!("{}: cannot be written; check that its folder exists and is writable", path.display())
+            })?;
+        }
         Ok(Output { path: path.to_owned(), outputs: self.clone() })
     }
 
@@ -50,12 +50,9 @@ impl Output {
     }
 
     /// Has `write` make the file.
-    pub fn write<E>(&self, write: impl FnOnce(&Path) -> Result<(), E>) -> Result<()>
-    where
-        anyhow::Error: From<E>,
-    {
+    pub fn write(&self, write: impl FnOnce(&Path) -> Result<(), FormatError>) -> Result<(), FormatError> {
         let _held = self.outputs.hold();
-        write(&self.path).map_err(anyhow::Error::from).with_context(|| format!("cannot write {}", self.path.display()))
+        write(&self.path)
     }
 }
 
@@ -69,14 +66,12 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let outputs = Outputs::default();
         let refused = |path: &Path| format!("{:#}", outputs.claim(path).err().expect("refused"));
-        assert!(refused(folder.path()).contains("not a regular file"));
-        assert!(refused(&folder.path().join("missing/a.hlf")).contains("make the folder"));
+        assert!(refused(folder.path()).contains("is a folder"));
+        assert!(refused(&folder.path().join("missing/a.hlf")).contains("check that its folder exists"));
         std::fs::write(folder.path().join("file"), "").unwrap();
-        assert!(refused(&folder.path().join("file/a.hlf")).contains("cannot write"));
-        assert!(refused(Path::new("")).contains("cannot write"));
-        if Path::new("/dev/null").exists() {
-            assert!(refused(Path::new("/dev/null")).contains("not a regular file"));
-        }
+        assert!(refused(&folder.path().join("file/a.hlf")).contains("cannot be written"));
+        assert!(refused(Path::new("")).contains("names no file"));
+        assert!(refused(Path::new("..")).contains("is a folder"));
     }
 
     #[test]
@@ -84,7 +79,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let output = Outputs::default().claim(&folder.path().join("a.hlf")).unwrap();
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
-        output.write(|path| std::fs::write(path, "whole")).unwrap();
+        output.write(|path| Ok(std::fs::write(path, "whole")?)).unwrap();
         assert_eq!(std::fs::read(output.path()).unwrap(), b"whole");
     }
 }

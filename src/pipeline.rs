@@ -1,6 +1,6 @@
 //! Scene → Solution → Baked, with the counts and seconds of every stage.
 
-use mesher::{BakeOptions, BakeStatistics};
+use mesher::BakeOptions;
 use scene::{Baked, BakedError, Provenance, Scene};
 use serde::Serialize;
 use solver::{Solution, SolveOptions};
@@ -11,23 +11,109 @@ use crate::progress::Stage;
 /// The program as a bake's provenance names it.
 pub const PROGRAM: &str = concat!("halflight ", env!("CARGO_PKG_VERSION"));
 
+/// Solves the scene's light; the seconds it took stand beside it.
+pub fn solve(scene: &Scene, flags: &LightFlags) -> (Solution, f64) {
+    let stage = Stage::start("solve");
+    let options = SolveOptions { link_error: flags.link_error, bounces: flags.bounces };
+    let solution = solver::solve(scene, &options, &|fraction| stage.advance(fraction));
+    (solution, stage.end())
+}
+
+/// Bakes a scene.
+pub fn bake(scene: &Scene, flags: &LightFlags) -> (Baked, BakeReport) {
+    let (solution, solve_seconds) = solve(scene, flags);
+    let stage = Stage::start("mesh");
+    let defaults = BakeOptions::default();
+    let options = BakeOptions {
+        discontinuities: flags.discontinuities.unwrap_or(defaults.discontinuities),
+        min_weight: flags.min_weight.unwrap_or(defaults.min_weight),
+        ..defaults
+    };
+    let (mut baked, statistics) = mesher::bake(scene, &solution, &options, &|fraction| stage.advance(fraction));
+    let mesh_seconds = stage.end();
+    let report = BakeReport {
+        polygons: scene.polygons.len(),
+        patches: solution.elements.patches.len(),
+        elements: solution.elements.leaves().count(),
+        links: solution.links.len(),
+        link_bytes: size_of_val(solution.links.as_slice()),
+        blockers: solution.blockers.polygons.len(),
+        blocker_bytes: solution.blockers.bytes(),
+        iterations: solution.convergence.iterations,
+        residual: solution.convergence.residual,
+        converged: solution.convergence.reached,
+        discontinuities_found: statistics.discontinuities_found,
+        discontinuities_kept: statistics.discontinuities_kept,
+        triangles: baked.triangles.len(),
+        samples: baked.samples.len(),
+        error: baked.error.into(),
+        seconds: Seconds { solve: solve_seconds, mesh: mesh_seconds, ..Seconds::default() },
+        peak_memory_bytes: None,
+    };
+    baked.provenance = provenance(&solution, &options, &report);
+    (baked, report)
+}
+
+/// What made a bake: the options as they were used, and the counts. No seconds: the same input gives the same bytes.
+fn provenance(solution: &Solution, options: &BakeOptions, report: &BakeReport) -> Provenance {
+    let bounces = solution.bounces.map_or_else(|| "all".to_owned(), |bounces| bounces.to_string());
+    let option = |name: &str, value: String| (name.to_owned(), value);
+    let count = |name: &str, value: usize| (name.to_owned(), value as f64);
+    Provenance {
+        program: PROGRAM.to_owned(),
+        options: vec![
+            option(BOUNCES, bounces),
+            option(LINK_ERROR, solution.link_error.to_string()),
+            option("discontinuities", options.discontinuities.to_string()),
+            option("min-weight", options.min_weight.to_string()),
+        ],
+        statistics: vec![
+            count("elements", report.elements),
+            count("links", report.links),
+            count("blockers", report.blockers),
+            count("discontinuities found", report.discontinuities_found),
+            count("discontinuities kept", report.discontinuities_kept),
+            ("residual".to_owned(), report.residual),
+        ],
+    }
+}
+
+const BOUNCES: &str = "bounces";
+const LINK_ERROR: &str = "link-error";
+
+/// The options that a bake's solution was made with, so that it can be made again.
+pub fn solve_flags(provenance: &Provenance) -> LightFlags {
+    let value = |name: &str| provenance.options.iter().find(|(option, _)| option == name).map(|(_, value)| value);
+    LightFlags {
+        bounces: value(BOUNCES).and_then(|value| value.parse().ok()),
+        link_error: value(LINK_ERROR).and_then(|value| value.parse().ok()),
+        ..LightFlags::default()
+    }
+}
+
 /// What one bake took and gave; `bake --json` prints it.
 #[derive(Debug, Serialize)]
 pub struct BakeReport {
     /// Polygons of the scene.
     pub polygons: usize,
+    /// Polygons after they were cut along their contact lines.
+    pub patches: usize,
     /// Leaf elements.
     pub elements: usize,
     /// Links between elements.
     pub links: usize,
     /// Bytes of the links.
     pub link_bytes: usize,
-    /// Polygons named in the links' blocker lists, each list counted once.
+    /// Polygons named in the links' blocker lists, each distinct list counted once.
     pub blockers: usize,
     /// Bytes of the blocker lists.
     pub blocker_bytes: usize,
-    /// What transport left undone: largest change of the last iteration relative to the largest irradiance.
+    /// Gathers over all links.
+    pub iterations: u32,
+    /// Power that the last gather still moved, as a fraction of the power that leaves all surfaces.
     pub residual: f64,
+    /// Whether the residual, or the number of bounces, that was asked for was reached.
+    pub converged: bool,
     /// Actual discontinuities found.
     pub discontinuities_found: usize,
     /// Discontinuities that the mesh follows.
@@ -44,13 +130,17 @@ pub struct BakeReport {
     pub peak_memory_bytes: Option<u64>,
 }
 
-/// [`BakedError`], as JSON names it.
+/// [`BakedError`] as JSON names it.
 #[derive(Debug, Serialize)]
 pub struct ErrorReport {
-    rms: f64,
-    p99: f64,
-    max: f64,
-    points: u64,
+    /// Root of the area-weighted mean square.
+    pub rms: f64,
+    /// 99th percentile by area.
+    pub p99: f64,
+    /// Largest.
+    pub max: f64,
+    /// Number of points compared.
+    pub points: u64,
 }
 
 impl From<BakedError> for ErrorReport {
@@ -72,10 +162,19 @@ pub struct Seconds {
     pub write: f64,
 }
 
-/// Solves the scene's light.
-pub fn solve(scene: &Scene, flags: &LightFlags) -> (Solution, f64) {
-    let stage = Stage::start("solve");
-    let options = SolveOptions { link_error: flags.link_error, bounces: flags.bounces };
-    let solution = solver::solve(scene, &options, &|fraction| stage.advance(fraction));
-    (solution, stage.end())
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_options_of_a_solution_are_read_back() {
+        let options = |bounces: &str, error: &str| Provenance {
+            options: vec![(BOUNCES.into(), bounces.into()), (LINK_ERROR.into(), error.into())],
+            ..Provenance::default()
+        };
+        let flags = solve_flags(&options("all", "0.30000000000000004"));
+        assert_eq!((flags.bounces, flags.link_error), (None, Some(0.300_000_000_000_000_04)));
+        assert_eq!(solve_flags(&options("0", "x")).bounces, Some(0));
+        assert_eq!(solve_flags(&Provenance::default()).link_error, None);
+    }
 }

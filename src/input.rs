@@ -1,0 +1,128 @@
+//! What a command is given: a scene, or a bake, or a scene that is baked first and kept in the user's cache folder.
+
+use std::path::{Path, PathBuf};
+use std::time::UNIX_EPOCH;
+
+use anyhow::{Context, Result, ensure};
+use directories::ProjectDirs;
+use scene::{Baked, Scene};
+
+use crate::args::LightFlags;
+use crate::output::Outputs;
+use crate::pipeline;
+use crate::progress::{Stage, say};
+
+/// A file that a command was given.
+pub enum Input {
+    /// A scene.
+    Scene(Scene),
+    /// A bake.
+    Baked(Baked),
+}
+
+impl Input {
+    /// Reads a scene or a bake, whichever the file is.
+    pub fn read(path: &Path) -> Result<Self> {
+        if formats::is_baked(path) {
+            Ok(Self::Baked(formats::read_baked(path)?))
+        } else {
+            Ok(Self::Scene(read_scene(path)?.0))
+        }
+    }
+
+    /// The bake: the one read, or the scene's.
+    pub fn into_baked(self, path: &Path, flags: &LightFlags, outputs: &Outputs) -> Result<Baked> {
+        match self {
+            Self::Baked(baked) => Ok(baked),
+            Self::Scene(scene) => {
+                require_light(path, &scene)?;
+                Ok(bake_once(&scene, flags, outputs))
+            }
+        }
+    }
+}
+
+/// Reads a scene, passing on what the importer repaired; the seconds it took stand beside it.
+pub fn read_scene(path: &Path) -> Result<(Scene, f64)> {
+    let stage = Stage::start("import");
+    let imported = formats::read_scene(path)?;
+    let seconds = stage.end();
+    for warning in &imported.report.warnings {
+        say(format_args!("warning: {warning}"));
+    }
+    Ok((imported.scene, seconds))
+}
+
+/// Refuses a scene that is dark.
+pub fn require_light(path: &Path, scene: &Scene) -> Result<()> {
+    ensure!(
+        scene.emitters().next().is_some(),
+        "{}: nothing emits light; give a material that its faces use an emitted radiance, such as the line \
+         `Ke 10 10 10` (W/(sr m²)) in the MTL file",
+        path.display()
+    );
+    Ok(())
+}
+
+/// The scene's bake, from the cache where it is there. A cache that cannot be used costs time, nothing else.
+fn bake_once(scene: &Scene, flags: &LightFlags, outputs: &Outputs) -> Baked {
+    let place = match place(scene, flags) {
+        Ok(place) => place,
+        Err(error) => {
+            say(format_args!("warning: the bake will not be kept: {error:#}"));
+            return pipeline::bake(scene, flags).0;
+        }
+    };
+    // A file that another version wrote, or a damaged one, is made anew.
+    if let Ok(baked) = formats::read_baked(&place) {
+        return baked;
+    }
+    let (baked, _) = pipeline::bake(scene, flags);
+    let kept = outputs.claim(&place).and_then(|output| Ok(output.write(|path| formats::write_baked(path, &baked))?));
+    if let Err(error) = kept {
+        say(format_args!("warning: the bake was not kept: {error:#}"));
+    }
+    baked
+}
+
+/// Where the cache keeps a bake.
+fn place(scene: &Scene, flags: &LightFlags) -> Result<PathBuf> {
+    let folders = ProjectDirs::from("", "", "halflight").context("this user has no home folder")?;
+    let folder = folders.cache_dir();
+    std::fs::create_dir_all(folder).with_context(|| format!("cannot make the folder {}", folder.display()))?;
+    Ok(folder.join(key(scene, flags)?).with_extension("hlf"))
+}
+
+/// The checksum of all that a bake depends on: scene, options, and this very build of the program.
+fn key(scene: &Scene, flags: &LightFlags) -> Result<String> {
+    let program = std::env::current_exe()?.metadata()?;
+    let built = program.modified()?.duration_since(UNIX_EPOCH)?.as_nanos();
+    let mut hasher = blake3::Hasher::new();
+    serde_json::to_writer(&mut hasher, &(pipeline::PROGRAM, program.len(), built, flags, scene))?;
+    Ok(hasher.finalize().to_hex().to_string())
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use scene::Material;
+
+    use super::*;
+
+    #[test]
+    fn a_bake_is_kept_for_its_scene_and_its_options() {
+        let scene = Scene::default();
+        let flags = LightFlags::default();
+        let other = Scene { materials: vec![Material::grey("grey")], ..Scene::default() };
+        assert_eq!(key(&scene, &flags).unwrap(), key(&scene.clone(), &flags).unwrap());
+        assert_ne!(key(&scene, &flags).unwrap(), key(&other, &flags).unwrap());
+        let bounced = LightFlags { bounces: Some(0), ..flags };
+        assert_ne!(key(&scene, &flags).unwrap(), key(&scene, &bounced).unwrap());
+    }
+
+    #[test]
+    fn darkness_is_refused_with_the_cure() {
+        let error = require_light(Path::new("dark.obj"), &Scene::default()).expect_err("dark").to_string();
+        assert!(error.contains("dark.obj") && error.contains("Ke"), "{error}");
+    }
+}

@@ -1,0 +1,98 @@
+//! `halflight probe`: irradiance at points, from the interpolants or by an exact gather.
+
+use std::io::Write;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use anyhow::{Context, Result, bail};
+use formats::SurfaceQuery;
+use rayon::prelude::*;
+use scene::{Baked, Bvh, Provenance, Rgb, Scene, centroid};
+use solver::Gather;
+
+use crate::args::{LightFlags, Method, ProbeFlags};
+use crate::failure::{Outcome, Usage};
+use crate::input::{Input, require_light};
+use crate::output::Outputs;
+use crate::pipeline;
+use crate::progress::{Stage, say};
+
+/// How far a point may lie from the surface that it means, as a fraction of the scene's size: above the rounding of
+/// a point printed with six digits, below the distance of surfaces that are meant to be apart.
+const REACH: f64 = 1e-4;
+
+/// Writes the irradiance at every point.
+pub fn run(flags: &ProbeFlags, outputs: &Outputs) -> Result<Outcome> {
+    let output = flags.output.as_deref().map(|path| outputs.claim(path)).transpose()?;
+    let points = formats::read_points(&flags.points)?;
+    let input = Input::read(&flags.input)?;
+    let asked = LightFlags { bounces: flags.bounces, ..LightFlags::default() };
+    let found = match (flags.method, input) {
+        (Method::Gather, Input::Scene(scene)) => {
+            require_light(&flags.input, &scene)?;
+            gather(&scene, &asked, &points)
+        }
+        (Method::Gather, Input::Baked(baked)) => gather(&baked.scene, &as_baked(&baked.provenance, &asked), &points),
+        (Method::Interpolant, Input::Baked(baked)) => {
+            let made = pipeline::solve_flags(&baked.provenance).bounces;
+            if flags.bounces.is_some() && flags.bounces != made {
+                bail!(Usage(format!(
+                    "--bounces: {} holds the light of {} bounces; give the scene, or --method gather",
+                    flags.input.display(),
+                    made.map_or_else(|| "all".to_owned(), |bounces| bounces.to_string())
+                )));
+            }
+            interpolate(&baked, &points)
+        }
+        (Method::Interpolant, scene) => interpolate(&scene.into_baked(&flags.input, &asked, outputs)?, &points),
+    };
+    match output {
+        Some(output) => output
+            .write(|path| formats::write_atomically(path, |file| formats::write_irradiance(file, &points, &found)))?,
+        None => {
+            let mut stdout = std::io::stdout().lock();
+            formats::write_irradiance(&mut stdout, &points, &found).context("cannot write to stdout")?;
+            stdout.flush().context("cannot write to stdout")?;
+        }
+    }
+    let missing = found.iter().filter(|irradiance| irradiance.is_none()).count();
+    if missing > 0 {
+        say(format_args!(
+            "warning: {missing} of {} points meet no surface: none within {REACH} of the scene's size has their normal",
+            points.len()
+        ));
+    }
+    Ok(Outcome::Done)
+}
+
+/// The options that solve a bake's scene again as it was solved, with the bounces asked for instead of its own.
+fn as_baked(provenance: &Provenance, asked: &LightFlags) -> LightFlags {
+    let made = pipeline::solve_flags(provenance);
+    LightFlags { bounces: asked.bounces.or(made.bounces), ..made }
+}
+
+fn interpolate(baked: &Baked, points: &[SurfaceQuery]) -> Vec<Option<Rgb>> {
+    let (bvh, reach) = (baked.bvh(), REACH * baked.scene.size());
+    let irradiance = |point: &SurfaceQuery| {
+        let (triangle, s, t) = baked.locate(&bvh, point.position, point.normal, reach)?;
+        Some(baked.irradiance(triangle, s, t))
+    };
+    points.iter().map(irradiance).collect()
+}
+
+fn gather(scene: &Scene, flags: &LightFlags, points: &[SurfaceQuery]) -> Vec<Option<Rgb>> {
+    let (solution, _) = pipeline::solve(scene, flags);
+    let gather = Gather::new(scene, &solution);
+    let (bvh, reach) = (Bvh::of_scene(scene), REACH * scene.size());
+    let (stage, done) = (Stage::start("gather"), AtomicUsize::new(0));
+    let irradiance = |point: &SurfaceQuery| {
+        stage.advance(done.fetch_add(1, Ordering::Relaxed) as f64 / points.len() as f64);
+        let polygon = bvh.nearest_surface(point.position, point.normal, reach)?.id;
+        let plane = scene.plane(polygon);
+        let position = point.position - plane.normal * plane.distance(point.position);
+        // On a contact line the side towards the middle of the polygon counts.
+        Some(gather.irradiance_at(polygon, position, centroid(&scene.outline(polygon)) - position))
+    };
+    let found = points.par_iter().map(irradiance).collect();
+    stage.end();
+    found
+}
