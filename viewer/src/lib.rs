@@ -1,1 +1,32 @@
-//! placeholder
+//! From a bake and a camera to pixels: the interactive half of Hardt & Teller 1996 (sections 2.3–2.8).
+//!
+//! A frame has the paper's passes. (a)+(b): every triangle is rasterised into a *visibility buffer* that holds, per
+//! pixel, the triangle's id and the perspective-correct barycentrics of the point seen. (c): every pixel evaluates
+//! its triangle's quadratic interpolant, L = ρE/π + Ke. (d): exposure, tone curve, display. [`draw_on_gpu`] runs the
+//! passes on a graphics adapter, [`draw_on_cpu`] is their twin on the host, where rays fill the visibility buffer;
+//! the two agree to 1/255. [`open_window`] walks through the bake.
+
+mod capture;
+mod controls;
+mod error;
+mod frame;
+mod gpu;
+mod interpolant_pass;
+mod mode;
+mod picture;
+mod records;
+#[cfg(test)]
+mod test_room;
+mod tone_map_pass;
+mod twin;
+mod visibility_pass;
+mod window;
+
+pub use capture::draw_on_gpu;
+pub use controls::{Flight, Steering};
+pub use error::ViewerError;
+pub use gpu::Gpu;
+pub use mode::{Mode, UnknownMode};
+pub use picture::{Frame, Picture};
+pub use twin::draw_on_cpu;
+pub use window::open_window;

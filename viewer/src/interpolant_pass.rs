@@ -1,0 +1,109 @@
+//! Pass (c): the light at every pixel (Hardt & Teller 1996, section 2.6), one compute invocation a pixel.
+
+use crate::{Mode, frame::Targets, gpu::ResidentBake, gpu::bind_group};
+
+/// Source of the shader.
+pub(crate) const SHADER: &str =
+    concat!(include_str!("shaders/frame.wgsl"), include_str!("shaders/interpolant_pass.wgsl"));
+
+/// Side of the square of pixels that a workgroup takes; the shader says the same.
+const WORKGROUP: u32 = 8;
+
+/// The pipelines of the pass, one a mode: a software adapter runs both sides of every branch that it cannot fold.
+pub(crate) struct InterpolantPass {
+    pipelines: [wgpu::ComputePipeline; Mode::ALL.len()],
+    frame_layout: wgpu::BindGroupLayout,
+    /// Layout of what the pass reads of a bake: triangles, elements, corners.
+    pub bake_layout: wgpu::BindGroupLayout,
+}
+
+impl InterpolantPass {
+    pub const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba32Float;
+
+    pub fn new(device: &wgpu::Device) -> Self {
+        let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
+            label: Some("interpolant"),
+            source: wgpu::ShaderSource::Wgsl(SHADER.into()),
+        });
+        // Explicit, because a layout made from one mode's shader would lack what the others read.
+        let layout = |label, types: &[wgpu::BindingType]| {
+            let entry = |(binding, &ty)| wgpu::BindGroupLayoutEntry {
+                binding,
+                visibility: wgpu::ShaderStages::COMPUTE,
+                ty,
+                count: None,
+            };
+            let entries: Vec<_> = (0..).zip(types).map(entry).collect();
+            device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some(label), entries: &entries })
+        };
+        let buffer = |ty| wgpu::BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None };
+        let view_dimension = wgpu::TextureViewDimension::D2;
+        let frame_layout = layout(
+            "frame",
+            &[
+                buffer(wgpu::BufferBindingType::Uniform),
+                wgpu::BindingType::Texture {
+                    sample_type: wgpu::TextureSampleType::Uint,
+                    view_dimension,
+                    multisampled: false,
+                },
+                wgpu::BindingType::StorageTexture {
+                    access: wgpu::StorageTextureAccess::WriteOnly,
+                    format: Self::FORMAT,
+                    view_dimension,
+                },
+            ],
+        );
+        let bake_layout = layout("bake", &[buffer(wgpu::BufferBindingType::Storage { read_only: true }); 3]);
+        let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+            label: Some("interpolant"),
+            bind_group_layouts: &[Some(&frame_layout), Some(&bake_layout)],
+            immediate_size: 0,
+        });
+        let pipelines = Mode::ALL.map(|mode| {
+            device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+                label: Some(mode.name()),
+                layout: Some(&pipeline_layout),
+                module: &module,
+                entry_point: Some("interpolate"),
+                compilation_options: wgpu::PipelineCompilationOptions {
+                    constants: &[("MODE", f64::from(mode as u8))],
+                    ..Default::default()
+                },
+                cache: None,
+            })
+        });
+        Self { pipelines, frame_layout, bake_layout }
+    }
+
+    /// What the pass reads and writes besides the bake.
+    pub fn inputs(
+        &self,
+        device: &wgpu::Device,
+        uniform: &wgpu::Buffer,
+        visibility: &wgpu::TextureView,
+        picture: &wgpu::TextureView,
+    ) -> wgpu::BindGroup {
+        let texture = wgpu::BindingResource::TextureView;
+        let resources = [uniform.as_entire_binding(), texture(visibility), texture(picture)];
+        bind_group(device, &self.frame_layout, &resources)
+    }
+
+    /// Evaluates every pixel of the visibility buffer.
+    pub fn encode(&self, encoder: &mut wgpu::CommandEncoder, targets: &Targets, bake: &ResidentBake, mode: Mode) {
+        let mut pass = encoder
+            .begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some("interpolant"), timestamp_writes: None });
+        pass.set_pipeline(&self.pipelines[mode as usize]);
+        pass.set_bind_group(0, &targets.interpolant_inputs, &[]);
+        pass.set_bind_group(1, &bake.interpolants, &[]);
+        pass.dispatch_workgroups(targets.width.div_ceil(WORKGROUP), targets.height.div_ceil(WORKGROUP), 1);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn the_shader_is_valid() {
+        crate::test_room::validate_shader(super::SHADER);
+    }
+}

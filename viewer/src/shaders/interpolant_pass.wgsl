@@ -1,0 +1,165 @@
+// Pass (c): the light at every pixel (Hardt & Teller, section 2.6). `twin.rs` says the same in Rust.
+
+struct Triangle {
+    // The coefficients of the interpolant times reflectance / pi: reflected radiance.
+    a: vec3<f32>,
+    element: u32,
+    b2: vec3<f32>,
+    edges: u32,
+    c2: vec3<f32>,
+    d: vec3<f32>,
+    e2: vec3<f32>,
+    f: vec3<f32>,
+    emitted: vec3<f32>,
+}
+
+@group(0) @binding(0) var<uniform> frame: Frame;
+@group(0) @binding(1) var visibility: texture_2d<u32>;
+// Radiance or display-linear colour; the fourth number is 1 where something was hit.
+@group(0) @binding(2) var picture: texture_storage_2d<rgba32float, write>;
+@group(1) @binding(0) var<storage, read> triangles: array<Triangle>;
+@group(1) @binding(1) var<storage, read> elements: array<vec4<f32>>;
+// Three corners of three numbers a triangle.
+@group(1) @binding(2) var<storage, read> corners: array<f32>;
+
+// One pipeline is made per mode: what the others need costs nothing then.
+override MODE: u32;
+const SHADED = 0u;
+const GOURAUD = 1u;
+const IDS = 2u;
+const BARYCENTRICS = 3u;
+const ELEMENTS = 4u;
+const MESH = 5u;
+const DISCONTINUITIES = 6u;
+const FALSE_COLOR = 7u;
+
+@compute @workgroup_size(8, 8)
+fn interpolate(@builtin(global_invocation_id) id: vec3<u32>) {
+    let pixel = id.xy;
+    if any(vec2<f32>(pixel) >= frame.size) {
+        return;
+    }
+    let seen = textureLoad(visibility, pixel, 0).xy;
+    var colour = vec3(0.0);
+    // Back sides are black.
+    if seen.x != 0u && seen.x < 0x80000000u {
+        colour = colour_at(seen.x - 1u, unpack2x16unorm(seen.y), vec2<f32>(pixel) + 0.5);
+    }
+    textureStore(picture, pixel, vec4(colour, f32(seen.x != 0u)));
+}
+
+fn colour_at(id: u32, st: vec2<f32>, pixel: vec2<f32>) -> vec3<f32> {
+    if MODE == GOURAUD {
+        return gouraud(id, st.x, st.y);
+    } else if MODE == IDS {
+        return id_colour(id);
+    } else if MODE == BARYCENTRICS {
+        return vec3(st, 0.0);
+    } else if MODE == ELEMENTS {
+        return overlay(tone_curve(elements[triangles[id].element].rgb * frame.exposure), id, pixel);
+    } else if MODE == MESH {
+        return overlay(tone_curve(interpolant(id, st.x, st.y) * frame.exposure), id, pixel);
+    } else if MODE == DISCONTINUITIES {
+        return overlay(0.35 * tone_curve(interpolant(id, st.x, st.y) * frame.exposure), id, pixel);
+    } else if MODE == FALSE_COLOR {
+        return false_color(interpolant(id, st.x, st.y));
+    }
+    return interpolant(id, st.x, st.y);
+}
+
+// A s^2 + 2B st + 2C s + D t^2 + 2E t + F, clamped at 0, and what the surface emits.
+fn interpolant(id: u32, s: f32, t: f32) -> vec3<f32> {
+    let reflected = (triangles[id].a * s + triangles[id].b2 * t + triangles[id].c2) * s
+        + (triangles[id].d * t + triangles[id].e2) * t + triangles[id].f;
+    return max(reflected, vec3(0.0)) + triangles[id].emitted;
+}
+
+// Linear between the values at the corners: F, A + 2C + F and D + 2E + F.
+fn gouraud(id: u32, s: f32, t: f32) -> vec3<f32> {
+    let reflected = (triangles[id].a + triangles[id].c2) * s + (triangles[id].d + triangles[id].e2) * t + triangles[id].f;
+    return max(reflected, vec3(0.0)) + triangles[id].emitted;
+}
+
+// A colour that neighbouring ids do not share: the id hashed (Jarzynski and Olano 2020, "pcg").
+fn id_colour(id: u32) -> vec3<f32> {
+    let state = id * 747796405u + 2891336453u;
+    let word = ((state >> ((state >> 28u) + 4u)) ^ state) * 277803737u;
+    let hash = (word >> 22u) ^ word;
+    // Not below 0.04: a hit must not look like the background.
+    return 0.04 + 0.96 * vec3<f32>(vec3(hash, hash >> 8u, hash >> 16u) & vec3(255u)) / 255.0;
+}
+
+// Ten stops around middle grey on a ramp of even lightness.
+fn false_color(radiance: vec3<f32>) -> vec3<f32> {
+    let luminance = dot(radiance, vec3(0.2126, 0.7152, 0.0722)) * frame.exposure;
+    let place = clamp(log2(max(luminance, 1e-30) / 0.18) / 10.0 + 0.5, 0.0, 1.0) * 9.0;
+    let index = min(u32(place), 8u);
+    return mix(RAMP[index], RAMP[index + 1u], place - f32(index));
+}
+
+// The colour map "inferno" of matplotlib at ten places, display-linear.
+const RAMP = array(
+    vec3(0.0000, 0.0000, 0.0012), vec3(0.0110, 0.0037, 0.0545), vec3(0.0704, 0.0037, 0.1470), vec3(0.1878, 0.0116, 0.1529),
+    vec3(0.3763, 0.0252, 0.1170), vec3(0.6240, 0.0578, 0.0612), vec3(0.8469, 0.1413, 0.0185), vec3(0.9647, 0.3231, 0.0018),
+    vec3(0.9301, 0.6308, 0.0452), vec3(0.9734, 1.0000, 0.3712));
+
+// Draws the edges of the pixel's triangle over a colour, anti-aliased.
+fn overlay(colour: vec3<f32>, id: u32, pixel: vec2<f32>) -> vec3<f32> {
+    let distances = edge_distances(id, pixel);
+    let codes = triangles[id].edges;
+    var drawn = colour;
+    for (var edge = 0u; edge < 3u; edge += 1u) {
+        let line = line_style(extractBits(codes, 10u * edge, 10u));
+        let coverage = clamp(line.half_width + 0.5 - distances[edge], 0.0, 1.0);
+        drawn = mix(drawn, line.colour, coverage * line.opacity);
+    }
+    return drawn;
+}
+
+struct Line {
+    colour: vec3<f32>,
+    opacity: f32,
+    // Pixels, on one side of the edge; the triangle on the other side draws the other half.
+    half_width: f32,
+}
+
+fn line_style(code: u32) -> Line {
+    // The classes of `records.rs`.
+    let kind = code & 7u;
+    if MODE == MESH {
+        // Every edge; those inside a leaf thinner, so that the quadtree stands out.
+        return Line(vec3(0.0), select(0.9, 0.6, kind == 0u), select(0.7, 0.3, kind == 0u));
+    }
+    if MODE == ELEMENTS {
+        return Line(vec3(0.0), select(0.0, 0.7, kind == 1u || kind == 2u), 0.5);
+    }
+    let strength = 0.3 + 0.7 * f32(code >> 3u) / 127.0;
+    switch kind {
+        case 1u: { return Line(vec3(0.5), 0.35, 0.3); }
+        case 2u: { return Line(vec3(1.0), 0.9, 0.6); }
+        case 3u: { return Line(vec3(1.0, 0.7, 0.05), strength, 0.9); }
+        case 4u: { return Line(vec3(1.0, 0.1, 0.6), strength, 0.9); }
+        case 5u: { return Line(vec3(0.05, 0.8, 1.0), strength, 0.9); }
+        default: { return Line(vec3(0.0), 0.0, 0.0); }
+    }
+}
+
+// Distances of a pixel from the lines that the triangle's edges 0-1, 1-2 and 2-0 make in the picture, in pixels.
+// The plane through the eye and an edge meets the picture plane in that line; no corner is divided by its depth, so
+// corners behind the eye do no harm.
+fn edge_distances(id: u32, pixel: vec2<f32>) -> vec3<f32> {
+    let place = vec3(pixel.x - 0.5 * frame.size.x, 0.5 * frame.size.y - pixel.y, frame.focal);
+    let c = array(corner(3u * id), corner(3u * id + 1u), corner(3u * id + 2u));
+    return vec3(line_distance(c[0], c[1], place), line_distance(c[1], c[2], place), line_distance(c[2], c[0], place));
+}
+
+fn line_distance(from_corner: vec3<f32>, to_corner: vec3<f32>, place: vec3<f32>) -> f32 {
+    let normal = cross(from_corner, to_corner);
+    return abs(dot(normal, place)) / max(length(normal.xy), 1e-30);
+}
+
+// A corner of a triangle in the camera's axes, metres.
+fn corner(index: u32) -> vec3<f32> {
+    let p = vec3(corners[3u * index], corners[3u * index + 1u], corners[3u * index + 2u]) - frame.eye;
+    return vec3(dot(p, frame.right), dot(p, frame.up), dot(p, frame.forward));
+}

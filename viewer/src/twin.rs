@@ -1,0 +1,370 @@
+//! The frame on the host: every pass's twin, function for function, so that a picture needs no graphics driver.
+//!
+//! Rays through the bake's hierarchy fill the visibility buffer instead of a rasteriser; from there on the arithmetic is
+//! that of the shaders, in f32, on the same records.
+
+use glam::{DVec2, Vec2, Vec3};
+use rayon::prelude::*;
+use scene::{Baked, Bvh, Camera, Exposure, encode_srgb, luminance, tone_curve};
+
+use crate::{
+    Frame, Mode, Picture,
+    frame::{FrameUniform, NEAR},
+    records::{Corners, Records, TriangleRecord},
+};
+
+/// Rows and columns of the grid that the light of a picture is metered on: enough that a lamp or a dark doorway moves
+/// the exposure smoothly, few enough to be traced between two frames.
+const METER_GRID: u32 = 32;
+
+/// Set in a visibility pixel whose triangle is seen from the back.
+const BACK: u32 = 1 << 31;
+
+/// Draws a picture of a bake on the CPU, on all of rayon's threads; the result does not depend on their number.
+///
+/// Agrees with [`crate::draw_on_gpu`] to 1/255, but for single pixels on silhouettes. A size of 0 gives an empty picture,
+/// and a camera that is not valid sees background alone.
+pub fn draw_on_cpu(baked: &Baked, frame: &Frame) -> Picture {
+    Twin::new(baked).draw(frame)
+}
+
+/// A bake as the host sees it.
+pub(crate) struct Twin {
+    records: Records,
+    bvh: Bvh,
+}
+
+/// One pixel of the visibility buffer: the triangle's id plus one with [`BACK`] where its back is seen, 0 for nothing;
+/// and the barycentrics s and t, 16 bits each.
+type VisibilityPixel = [u32; 2];
+
+impl Twin {
+    pub fn new(baked: &Baked) -> Self {
+        Self { records: Records::of(baked), bvh: baked.bvh() }
+    }
+
+    pub fn draw(&self, frame: &Frame) -> Picture {
+        let exposure = frame.exposure.unwrap_or_else(|| self.meter(&frame.camera, frame.width, frame.height));
+        let mut picture = Picture {
+            width: frame.width,
+            height: frame.height,
+            radiance: vec![Vec3::ZERO; frame.pixels()],
+            rgb: vec![[0; 3]; frame.pixels()],
+            background: frame.pixels() as u64,
+            exposure,
+        };
+        if frame.pixels() == 0 || !frame.camera.is_valid() {
+            return picture;
+        }
+        let uniform = FrameUniform::of(frame, exposure);
+        let width = frame.width as usize;
+        let rows = picture.radiance.par_chunks_mut(width).zip(picture.rgb.par_chunks_mut(width)).enumerate();
+        let hits = rows.map(|(y, (radiance, rgb))| {
+            let mut hits = 0;
+            for (x, (radiance, rgb)) in radiance.iter_mut().zip(rgb).enumerate() {
+                let place = Vec2::new(x as f32 + 0.5, y as f32 + 0.5);
+                let seen = self.visibility(&frame.camera, place, frame.width, frame.height);
+                *radiance = self.colour(&uniform, frame.mode, seen, place);
+                *rgb = tone_map(*radiance, frame.mode, exposure);
+                hits += u64::from(seen[0] != 0);
+            }
+            hits
+        });
+        picture.background -= hits.sum::<u64>();
+        picture
+    }
+
+    /// The exposure of a view: metered on a grid over the surfaces that reflect light, because a lamp in the picture
+    /// must not darken the room; on the lamps where nothing else is seen.
+    pub fn meter(&self, camera: &Camera, width: u32, height: u32) -> Exposure {
+        if !camera.is_valid() || width == 0 || height == 0 {
+            return Exposure { ev: 0.0 };
+        }
+        let place = |i: u32, pixels: u32| (i as f32 + 0.5) * pixels as f32 / METER_GRID as f32;
+        let seen: Vec<(bool, f64)> = (0..METER_GRID * METER_GRID)
+            .into_par_iter()
+            .filter_map(|i| {
+                let place = Vec2::new(place(i % METER_GRID, width), place(i / METER_GRID, height));
+                let [id, barycentrics] = self.visibility(camera, place, width, height);
+                let front = id != 0 && id & BACK == 0;
+                front.then(|| {
+                    let record = &self.records.triangles[(id - 1) as usize];
+                    let (s, t) = unpack_barycentrics(barycentrics);
+                    let emits = record.emitted.iter().any(|&channel| channel > 0.0);
+                    (emits, luminance(interpolant(record, s, t).as_dvec3()))
+                })
+            })
+            .collect();
+        let any_reflects = seen.iter().any(|&(emits, _)| !emits);
+        Exposure::metered(seen.iter().filter(|(emits, _)| !any_reflects || !emits).map(|&(_, luminance)| luminance))
+    }
+
+    /// Passes (a) and (b): what a ray through a point of the picture meets beyond the near plane.
+    fn visibility(&self, camera: &Camera, place: Vec2, width: u32, height: u32) -> VisibilityPixel {
+        let ray = camera.ray(DVec2::new(place.x.into(), place.y.into()), width, height);
+        let (.., forward) = camera.basis();
+        match self.bvh.closest_hit(&ray, NEAR / ray.direction.dot(forward)) {
+            None => [0, 0],
+            Some(hit) => {
+                let back = if hit.normal.dot(ray.direction) < 0.0 { 0 } else { BACK };
+                [(hit.id + 1) | back, pack_barycentrics(hit.s as f32, hit.t as f32)]
+            }
+        }
+    }
+
+    /// Pass (c): the radiance or display-linear colour of a pixel.
+    fn colour(&self, frame: &FrameUniform, mode: Mode, [id, barycentrics]: VisibilityPixel, place: Vec2) -> Vec3 {
+        if id == 0 || id & BACK != 0 {
+            return Vec3::ZERO;
+        }
+        let id = id - 1;
+        let record = &self.records.triangles[id as usize];
+        let (s, t) = unpack_barycentrics(barycentrics);
+        let exposed = |radiance: Vec3| (radiance * frame.exposure).map(tone_curve);
+        let overlay = |colour| overlay(colour, frame, mode, record, &self.records.corners[id as usize], place);
+        match mode {
+            Mode::Shaded => interpolant(record, s, t),
+            Mode::Gouraud => gouraud(record, s, t),
+            Mode::Ids => id_colour(id),
+            Mode::Barycentrics => Vec3::new(s, t, 0.0),
+            Mode::Elements => {
+                let [r, g, b, _] = self.records.elements[record.element as usize];
+                overlay(exposed(Vec3::new(r, g, b)))
+            }
+            Mode::Mesh => overlay(exposed(interpolant(record, s, t))),
+            Mode::Discontinuities => overlay(0.35 * exposed(interpolant(record, s, t))),
+            Mode::FalseColor => false_color(interpolant(record, s, t), frame.exposure),
+        }
+    }
+}
+
+/// Barycentrics in 16 bits each, as the shaders' `pack2x16unorm` has them.
+fn pack_barycentrics(s: f32, t: f32) -> u32 {
+    let pack = |value: f32| (0.5 + 65535.0 * value.clamp(0.0, 1.0)) as u32;
+    pack(s) | pack(t) << 16
+}
+
+fn unpack_barycentrics(packed: u32) -> (f32, f32) {
+    ((packed & 0xffff) as f32 / 65535.0, (packed >> 16) as f32 / 65535.0)
+}
+
+/// The quadratic, clamped at 0, and what the surface emits, W·sr⁻¹·m⁻².
+pub(crate) fn interpolant(record: &TriangleRecord, s: f32, t: f32) -> Vec3 {
+    let [a, b2, c2, d, e2, f] = [record.a, record.b2, record.c2, record.d, record.e2, record.f].map(Vec3::from);
+    let reflected = (a * s + b2 * t + c2) * s + (d * t + e2) * t + f;
+    reflected.max(Vec3::ZERO) + Vec3::from(record.emitted)
+}
+
+/// Linear between the values at the corners: F, A + 2C + F and D + 2E + F.
+fn gouraud(record: &TriangleRecord, s: f32, t: f32) -> Vec3 {
+    let [a, c2, d, e2, f] = [record.a, record.c2, record.d, record.e2, record.f].map(Vec3::from);
+    let reflected = (a + c2) * s + (d + e2) * t + f;
+    reflected.max(Vec3::ZERO) + Vec3::from(record.emitted)
+}
+
+/// A colour that neighbouring ids do not share: the id hashed (Jarzynski and Olano 2020, "pcg").
+fn id_colour(id: u32) -> Vec3 {
+    let state = id.wrapping_mul(747_796_405).wrapping_add(2_891_336_453);
+    let word = ((state >> ((state >> 28) + 4)) ^ state).wrapping_mul(277_803_737);
+    let hash = (word >> 22) ^ word;
+    let channel = |shift: u32| 0.04 + 0.96 * ((hash >> shift) & 255) as f32 / 255.0;
+    Vec3::new(channel(0), channel(8), channel(16))
+}
+
+/// The colour map "inferno" of matplotlib at ten places, display-linear.
+const RAMP: [Vec3; 10] = [
+    Vec3::new(0.0000, 0.0000, 0.0012),
+    Vec3::new(0.0110, 0.0037, 0.0545),
+    Vec3::new(0.0704, 0.0037, 0.1470),
+    Vec3::new(0.1878, 0.0116, 0.1529),
+    Vec3::new(0.3763, 0.0252, 0.1170),
+    Vec3::new(0.6240, 0.0578, 0.0612),
+    Vec3::new(0.8469, 0.1413, 0.0185),
+    Vec3::new(0.9647, 0.3231, 0.0018),
+    Vec3::new(0.9301, 0.6308, 0.0452),
+    Vec3::new(0.9734, 1.0000, 0.3712),
+];
+
+/// Ten stops around middle grey on a ramp of even lightness.
+fn false_color(radiance: Vec3, exposure: f32) -> Vec3 {
+    let luminance = radiance.dot(Vec3::new(0.2126, 0.7152, 0.0722)) * exposure;
+    let place = ((luminance.max(1e-30) / 0.18).log2() / 10.0 + 0.5).clamp(0.0, 1.0) * 9.0;
+    let index = (place as usize).min(8);
+    RAMP[index].lerp(RAMP[index + 1], place - index as f32)
+}
+
+/// Draws the edges of the pixel's triangle over a colour, anti-aliased.
+fn overlay(
+    colour: Vec3,
+    frame: &FrameUniform,
+    mode: Mode,
+    record: &TriangleRecord,
+    corners: &Corners,
+    place: Vec2,
+) -> Vec3 {
+    let distances = edge_distances(frame, corners, place);
+    (0..3).fold(colour, |drawn, edge| {
+        let line = line_style(mode, (record.edges >> (10 * edge)) & 0x3ff);
+        let coverage = (line.half_width + 0.5 - distances[edge as usize]).clamp(0.0, 1.0);
+        drawn.lerp(line.colour, coverage * line.opacity)
+    })
+}
+
+/// How an edge is drawn.
+struct Line {
+    colour: Vec3,
+    opacity: f32,
+    /// Pixels, on one side of the edge; the triangle on the other side draws the other half.
+    half_width: f32,
+}
+
+fn line_style(mode: Mode, code: u32) -> Line {
+    let line = |colour: [f32; 3], opacity, half_width| Line { colour: colour.into(), opacity, half_width };
+    // The classes of `records.rs`.
+    let class = code & 7;
+    match mode {
+        // Every edge; those inside a leaf thinner, so that the quadtree stands out.
+        Mode::Mesh if class == 0 => line([0.0; 3], 0.6, 0.3),
+        Mode::Mesh => line([0.0; 3], 0.9, 0.7),
+        Mode::Elements => line([0.0; 3], if class == 1 || class == 2 { 0.7 } else { 0.0 }, 0.5),
+        _ => {
+            let strength = 0.3 + 0.7 * (code >> 3) as f32 / 127.0;
+            match class {
+                1 => line([0.5; 3], 0.35, 0.3),
+                2 => line([1.0; 3], 0.9, 0.6),
+                3 => line([1.0, 0.7, 0.05], strength, 0.9),
+                4 => line([1.0, 0.1, 0.6], strength, 0.9),
+                5 => line([0.05, 0.8, 1.0], strength, 0.9),
+                _ => line([0.0; 3], 0.0, 0.0),
+            }
+        }
+    }
+}
+
+/// Distances of a pixel from the lines that the triangle's edges 0→1, 1→2 and 2→0 make in the picture, in pixels.
+/// The plane through the eye and an edge meets the picture plane in that line; no corner is divided by its depth, so
+/// corners behind the eye do no harm.
+fn edge_distances(frame: &FrameUniform, corners: &Corners, place: Vec2) -> [f32; 3] {
+    let [width, height] = frame.size;
+    let place = Vec3::new(place.x - 0.5 * width, 0.5 * height - place.y, frame.focal);
+    let [eye, right, up, forward] = [frame.eye, frame.right, frame.up, frame.forward].map(Vec3::from);
+    let [a, b, c] = corners.map(|corner| {
+        let p = Vec3::from(corner) - eye;
+        Vec3::new(p.dot(right), p.dot(up), p.dot(forward))
+    });
+    let distance = |from: Vec3, to: Vec3| {
+        let normal = from.cross(to);
+        normal.dot(place).abs() / normal.truncate().length().max(1e-30)
+    };
+    [distance(a, b), distance(b, c), distance(c, a)]
+}
+
+/// Pass (d): what a display shows.
+fn tone_map(colour: Vec3, mode: Mode, exposure: Exposure) -> [u8; 3] {
+    let shown = if mode.is_light() { (colour * exposure.factor()).map(tone_curve) } else { colour };
+    shown.to_array().map(|channel| (encode_srgb(channel) * 255.0 + 0.5) as u8)
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+
+    use glam::DVec3;
+
+    use super::*;
+    use crate::test_room::{camera, room};
+
+    fn frame(mode: Mode) -> Frame {
+        Frame { camera: camera(), width: 96, height: 64, mode, exposure: None }
+    }
+
+    #[test]
+    fn no_pixels_no_triangles_or_no_view_is_no_panic() {
+        let empty = Baked::default();
+        let picture = draw_on_cpu(&empty, &frame(Mode::Shaded));
+        assert_eq!((picture.background, picture.exposure.ev), (96 * 64, 0.0));
+        assert!(picture.rgb.iter().all(|&rgb| rgb == [0; 3]));
+        let room = room();
+        for (width, height) in [(0, 0), (0, 9), (9, 0)] {
+            let picture = draw_on_cpu(&room, &Frame { width, height, ..frame(Mode::Mesh) });
+            assert!(picture.rgb.is_empty() && picture.radiance.is_empty() && picture.background == 0);
+        }
+        let nowhere = Camera { target: camera().eye, ..camera() };
+        assert_eq!(draw_on_cpu(&room, &Frame { camera: nowhere, ..frame(Mode::Shaded) }).background, 96 * 64);
+    }
+
+    #[test]
+    fn a_closed_room_has_no_background_and_its_radiance_is_that_of_the_bake() {
+        let room = room();
+        let picture = draw_on_cpu(&room, &frame(Mode::Shaded));
+        assert_eq!(picture.background, 0);
+        let bvh = room.bvh();
+        for (x, y) in [(0u32, 0u32), (47, 31), (95, 63), (10, 50)] {
+            let ray = camera().ray(DVec2::new(f64::from(x) + 0.5, f64::from(y) + 0.5), 96, 64);
+            let exact = room.radiance_along(&bvh, &ray).unwrap();
+            let ours = picture.radiance[(y * 96 + x) as usize].as_dvec3();
+            assert!((ours - exact).length() < 1e-4 * exact.length(), "{ours} {exact}");
+        }
+    }
+
+    #[test]
+    fn from_outside_the_back_sides_block_and_are_black() {
+        let outside = Camera { eye: DVec3::new(-9.0, 1.6, 1.3), target: DVec3::new(2.0, 1.6, 1.3), ..camera() };
+        for mode in Mode::ALL {
+            let picture = draw_on_cpu(&room(), &Frame { camera: outside, ..frame(mode) });
+            assert!(picture.background > 0 && picture.background < 96 * 64);
+            assert!(picture.rgb.iter().all(|&rgb| rgb == [0; 3]));
+        }
+    }
+
+    #[test]
+    fn a_lamp_in_view_does_not_darken_the_room() {
+        let mut room = room();
+        let dim = Twin::new(&room).meter(&camera(), 96, 64);
+        room.scene.materials[2].radiance *= 100.0;
+        assert_eq!(Twin::new(&room).meter(&camera(), 96, 64), dim);
+        // Nothing but the lamp in view: then it is metered itself.
+        let up =
+            Camera { eye: DVec3::new(2.05, 1.65, 2.6), target: DVec3::new(2.05, 1.65, 2.7), up: DVec3::X, ..camera() };
+        assert!(Twin::new(&room).meter(&up, 96, 64).ev < -8.0);
+    }
+
+    /// Against the projection of the corners, which needs a division that the pass avoids.
+    #[test]
+    fn edge_distances_are_pixels() {
+        let frame = frame(Mode::Mesh);
+        let uniform = FrameUniform::of(&frame, Exposure { ev: 0.0 });
+        let (right, up, forward) = frame.camera.basis();
+        // Three points in the picture, pixels, at different depths.
+        let pixels = [Vec2::new(20.0, 10.0), Vec2::new(80.0, 10.0), Vec2::new(20.0, 55.0)];
+        let corners = std::array::from_fn(|i| {
+            let depth = 1.0 + i as f64;
+            let (x, y) = (f64::from(pixels[i].x) - 48.0, 32.0 - f64::from(pixels[i].y));
+            let direction = (right * x + up * y) / f64::from(uniform.focal) + forward;
+            (frame.camera.eye + direction * depth).as_vec3().to_array()
+        });
+        let [top, hypotenuse, left] = edge_distances(&uniform, &corners, Vec2::new(23.0, 14.0));
+        assert!((top - 4.0).abs() < 1e-3 && (left - 3.0).abs() < 1e-3, "{top} {left}");
+        let normal = Vec2::new(45.0, 60.0).normalize();
+        assert!((hypotenuse - (pixels[1] - Vec2::new(23.0, 14.0)).dot(normal)).abs() < 1e-3);
+    }
+
+    #[test]
+    fn packed_barycentrics_come_back_within_half_a_step() {
+        for (s, t) in [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0 / 3.0, 0.123_456)] {
+            let (packed_s, packed_t) = unpack_barycentrics(pack_barycentrics(s, t));
+            assert!((packed_s - s).abs() <= 0.5 / 65535.0 && (packed_t - t).abs() <= 0.5 / 65535.0);
+        }
+        assert_eq!(unpack_barycentrics(pack_barycentrics(-1.0, 7.0)), (0.0, 1.0));
+    }
+
+    #[test]
+    fn false_color_climbs_with_luminance_through_ten_stops() {
+        assert_eq!(false_color(Vec3::ZERO, 1.0), RAMP[0]);
+        assert_eq!(false_color(Vec3::splat(0.18 * 64.0), 1.0), RAMP[9]);
+        let brightness: Vec<f32> = (-10..=10)
+            .map(|half| false_color(Vec3::splat(0.18 * (half as f32 / 2.0).exp2()), 1.0).element_sum())
+            .collect();
+        assert!(brightness.windows(2).all(|pair| pair[0] < pair[1]), "{brightness:?}");
+    }
+}
