@@ -66,7 +66,24 @@ pub(crate) fn arrange(
         }
         pieces = pieces.iter().zip(splits).flat_map(|(piece, at)| split(piece, at)).collect();
     }
+    remove_unused(&mut points, border_count as usize, &mut pieces);
     Arrangement { points, segments: pieces, along_border }
+}
+
+/// Takes out the points after the first `keep` that no segment uses: ends of segments that have collapsed.
+fn remove_unused(points: &mut Vec<DVec2>, keep: usize, segments: &mut [Segment]) {
+    let mut used: Vec<u32> =
+        segments.iter().flat_map(|segment| segment.ends).filter(|&end| end as usize >= keep).collect();
+    used.sort_unstable();
+    used.dedup();
+    for end in segments.iter_mut().flat_map(|segment| &mut segment.ends) {
+        if let Ok(place) = used.binary_search(end) {
+            *end = (keep + place) as u32;
+        }
+    }
+    let kept: Vec<DVec2> = used.iter().map(|&end| points[end as usize]).collect();
+    points.truncate(keep);
+    points.extend(kept);
 }
 
 /// The nearest point within `reach` of a position, or a new one there.
@@ -142,4 +159,54 @@ fn crossing([a, b]: [DVec2; 2], [c, d]: [DVec2; 2]) -> Option<DVec2> {
 pub(crate) fn on_grid(point: DVec2) -> DVec2 {
     const CELLS: f64 = (1u64 << 40) as f64;
     (point * CELLS).round() / CELLS
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn inside(ax: f64, ay: f64, bx: f64, by: f64) -> [End; 2] {
+        [End::Inside(DVec2::new(ax, ay)), End::Inside(DVec2::new(bx, by))]
+    }
+
+    fn arranged(segments: &[[End; 2]]) -> Arrangement {
+        let segments: Vec<_> = segments.iter().copied().zip(0..).collect();
+        arrange(Vec::new(), &segments, 1e-3, |_, _| false)
+    }
+
+    #[test]
+    fn segments_without_length_leave_no_point() {
+        let arrangement =
+            arranged(&[inside(0.5, 0.5, 0.5, 0.5), inside(0.1, 0.1, 0.1005, 0.1), inside(0., 0., 0., 1.)]);
+        assert_eq!(arrangement.points.len(), 2);
+        assert_eq!(arrangement.segments, [Segment { ends: [0, 1], line: 2 }]);
+    }
+
+    #[test]
+    fn crossing_touching_and_overlapping_segments_are_split() {
+        let cross = arranged(&[inside(0., 0., 1., 1.), inside(0., 1., 1., 0.)]);
+        assert_eq!((cross.points.len(), cross.segments.len()), (5, 4));
+        assert!(cross.points.contains(&DVec2::splat(0.5)));
+
+        let touch = arranged(&[inside(0., 0., 1., 0.), inside(0.5, 0.0009, 0.5, 1.0)]);
+        assert_eq!((touch.points.len(), touch.segments.len()), (4, 3));
+
+        let overlap = arranged(&[inside(0., 0., 0.75, 0.), inside(0.25, 0., 1., 0.)]);
+        let lines: Vec<u32> = overlap.segments.iter().map(|segment| segment.line).collect();
+        assert_eq!((overlap.points.len(), lines), (4, vec![0, 0, 1]));
+    }
+
+    #[test]
+    fn bending_one_segment_across_another_is_settled() {
+        // The flat one is bent to the end of the second, and thereby across the third.
+        let arrangement =
+            arranged(&[inside(0., 0., 1., 0.), inside(0.5, 0.0009, 0.5, 1.0), inside(0.49, 0.0005, 0.48, 1.0)]);
+        for (i, first) in arrangement.segments.iter().enumerate() {
+            for second in &arrangement.segments[..i] {
+                let ends = [first, second].map(|segment| segment.ends.map(|end| arrangement.points[end as usize]));
+                assert!(first.ends.iter().any(|end| second.ends.contains(end)) || crossing(ends[0], ends[1]).is_none());
+            }
+        }
+        assert!(arrangement.along_border.is_empty());
+    }
 }
