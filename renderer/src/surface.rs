@@ -1,0 +1,240 @@
+//! Points on the surfaces of a scene: how a path goes from one to the next, and how to spread many by area.
+
+use std::collections::BTreeMap;
+
+use glam::DVec3;
+use scene::{Bvh, Plane, Ray, Scene};
+
+use crate::sequence::{Kronecker, Stream};
+
+/// Several f64 roundings of a point, as a fraction of the scene's size: a point this near to a plane is in it.
+const ROUNDING: f64 = 1e-12;
+
+/// How far, as a fraction of the scene's size, a given point may be from a polygon that it is meant to lie on: files
+/// often carry seven digits. A point farther off is taken as one in empty space.
+const REACH: f64 = 1e-6;
+
+/// A point on the front of a polygon.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SurfacePoint {
+    /// Position in the polygon's plane, metres.
+    pub position: DVec3,
+    /// Unit normal, to the front.
+    pub normal: DVec3,
+    /// The polygon.
+    pub polygon: u32,
+}
+
+/// A point that gathers light: on a polygon, or with none under it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Receiver {
+    pub position: DVec3,
+    pub normal: DVec3,
+    pub polygon: Option<u32>,
+}
+
+impl From<SurfacePoint> for Receiver {
+    fn from(point: SurfacePoint) -> Self {
+        Self { position: point.position, normal: point.normal, polygon: Some(point.polygon) }
+    }
+}
+
+/// The surfaces of a scene, as paths need them.
+pub(crate) struct Surfaces<'a> {
+    pub scene: &'a Scene,
+    pub bvh: &'a Bvh,
+    planes: Vec<Plane>,
+    /// The polygon that has the same corners and the opposite front, if any: the other side of a two-sided surface.
+    other_sides: Vec<Option<u32>>,
+    /// Lengths up to this are rounding, metres.
+    pub rounding: f64,
+}
+
+impl<'a> Surfaces<'a> {
+    pub fn new(scene: &'a Scene, bvh: &'a Bvh) -> Self {
+        let planes: Vec<_> = scene.polygon_ids().map(|polygon| scene.plane(polygon)).collect();
+        let other_sides = other_sides(scene, &planes);
+        Self { scene, bvh, planes, other_sides, rounding: ROUNDING * scene.size() }
+    }
+
+    pub fn plane(&self, polygon: u32) -> Plane {
+        self.planes[polygon as usize]
+    }
+
+    /// Whether a receiver lies on a polygon or on the other side of it.
+    pub fn is_on(&self, receiver: &Receiver, polygon: u32) -> bool {
+        receiver.polygon.is_some_and(|own| self.is_same_surface(own, polygon))
+    }
+
+    fn is_same_surface(&self, a: u32, b: u32) -> bool {
+        a == b || self.other_sides[a as usize] == Some(b)
+    }
+
+    /// Whether anything stands between a receiver and a point on a polygon.
+    pub fn is_blocked(&self, receiver: &Receiver, target: DVec3, polygon: u32) -> bool {
+        let between = |id| !self.is_on(receiver, id) && !self.is_same_surface(polygon, id);
+        self.bvh.is_blocked_among(receiver.position, target, between)
+    }
+
+    /// The receiver at a given place: on the nearest polygon within [`REACH`] whose front agrees with the normal, in
+    /// its plane, or in empty space.
+    pub fn receiver_at(&self, position: DVec3, normal: DVec3) -> Receiver {
+        let normal = normal.normalize_or_zero();
+        match self.bvh.nearest_surface(position, normal, REACH * self.scene.size()) {
+            None => Receiver { position, normal, polygon: None },
+            Some(hit) => {
+                let plane = self.plane(hit.id);
+                let position = position - plane.normal * plane.distance(position);
+                Receiver { position, normal: plane.normal, polygon: Some(hit.id) }
+            }
+        }
+    }
+
+    /// The surface that a receiver sees in a direction: none where the ray leaves the scene or meets a black back.
+    ///
+    /// No offset along the ray keeps it off its own surface, since that would see through a contact: a convex polygon
+    /// cannot see itself, so hits on the receiver's own polygon are passed over by name.
+    pub fn seen_from(&self, receiver: &Receiver, direction: DVec3) -> Option<SurfacePoint> {
+        let ray = Ray { origin: receiver.position, direction };
+        let hit = self.bvh.closest_hit_among(&ray, |id| !self.is_on(receiver, id))?;
+        let front = self.plane(hit.id).normal.dot(direction) < 0.0;
+        let polygon = if front { hit.id } else { self.other_sides[hit.id as usize]? };
+        let plane = self.plane(polygon);
+        let position = ray.at(hit.distance);
+        let position = position - plane.normal * plane.distance(position);
+        Some(SurfacePoint { position, normal: plane.normal, polygon })
+    }
+}
+
+/// Pairs of polygons with the same corners and opposite normals.
+fn other_sides(scene: &Scene, planes: &[Plane]) -> Vec<Option<u32>> {
+    let mut by_corners: BTreeMap<Vec<u32>, Vec<u32>> = BTreeMap::new();
+    for polygon in scene.polygon_ids() {
+        let mut corners = scene.corners[scene.polygons[polygon as usize].corner_range()].to_vec();
+        corners.sort_unstable();
+        by_corners.entry(corners).or_default().push(polygon);
+    }
+    let mut other_sides = vec![None; scene.polygons.len()];
+    for same in by_corners.values() {
+        for &polygon in same {
+            let opposite = |&other: &u32| planes[other as usize].normal.dot(planes[polygon as usize].normal) < 0.0;
+            other_sides[polygon as usize] = same.iter().copied().find(opposite);
+        }
+    }
+    other_sides
+}
+
+/// Distance in its plane from a point to the border of a polygon, metres; negative outside.
+fn border_distance(scene: &Scene, polygon: u32, point: DVec3) -> f64 {
+    let outline = scene.outline(polygon);
+    let normal = scene.plane(polygon).normal;
+    let edges = outline.iter().zip(outline.iter().cycle().skip(1));
+    edges
+        .filter_map(|(&from, &to)| Some(normal.cross((to - from).try_normalize()?).dot(point - from)))
+        .fold(f64::INFINITY, f64::min)
+}
+
+/// Spreads points evenly by area over the fronts of the polygons that `wanted` accepts, none nearer than `border`
+/// metres to an edge of its polygon. Points lie exactly in the plane of an axis-parallel polygon, and come in the
+/// order of polygons. Fewer than `count` come back only where all of a polygon is border.
+pub fn spread_by_area(
+    scene: &Scene,
+    count: u32,
+    border: f64,
+    seed: u64,
+    wanted: impl Fn(u32) -> bool,
+) -> Vec<SurfacePoint> {
+    /// Places tried for a point before its stratum counts as all border.
+    const TRIES: u32 = 100;
+    let mut triangles = Vec::new();
+    let mut total = 0.0;
+    for polygon in scene.polygon_ids().filter(|&polygon| wanted(polygon)) {
+        let outline = scene.outline(polygon);
+        for pair in outline[1..].windows(2) {
+            let sides = [pair[0] - outline[0], pair[1] - outline[0]];
+            total += sides[0].cross(sides[1]).length() / 2.0;
+            triangles.push((total, polygon, outline[0], sides));
+        }
+    }
+    let mut stream = Stream::new(seed, 0);
+    let mut across = Kronecker::<1>::shifted_by(&mut stream);
+    let mut points = Vec::with_capacity(count as usize);
+    for i in 0..count {
+        for _ in 0..TRIES {
+            let area = (f64::from(i) + stream.uniform()) / f64::from(count) * total;
+            let index = triangles.partition_point(|triangle| triangle.0 <= area);
+            let Some(&(end, polygon, origin, sides)) = triangles.get(index) else { continue };
+            let start = if index == 0 { 0.0 } else { triangles[index - 1].0 };
+            // The share of the triangle's area passed so far sweeps a line from a corner to the opposite side.
+            let sweep = ((area - start) / (end - start)).sqrt();
+            let [along] = across.point();
+            let position = origin + sides[0] * (sweep * (1.0 - along)) + sides[1] * (sweep * along);
+            if border_distance(scene, polygon, position) > border {
+                points.push(SurfacePoint { position, normal: scene.plane(polygon).normal, polygon });
+                break;
+            }
+        }
+    }
+    points
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::path_trace::test_scenes::{black, scene_of};
+
+    fn square(z: f64) -> Vec<DVec3> {
+        [(0., 0.), (1., 0.), (1., 1.), (0., 1.)].map(|(x, y)| DVec3::new(x, y, z)).to_vec()
+    }
+
+    #[test]
+    fn nothing_to_spread_over_gives_no_points() {
+        assert_eq!(spread_by_area(&Scene::default(), 10, 0.0, 1, |_| true), vec![]);
+        let scene = scene_of(&[(square(0.0), black())]);
+        assert_eq!(spread_by_area(&scene, 10, 0.0, 1, |_| false), vec![]);
+        assert_eq!(spread_by_area(&scene, 10, 0.6, 1, |_| true), vec![], "all of it is nearer than 0.6 to an edge");
+    }
+
+    #[test]
+    fn points_are_spread_by_area_and_off_the_border() {
+        let wide = square(2.5).iter().map(|p| DVec3::new(3.0 * p.x, p.y, p.z)).collect();
+        let scene = scene_of(&[(square(0.1), black()), (wide, black())]);
+        let points = spread_by_area(&scene, 400, 1e-3, 1, |_| true);
+        assert_eq!(points.len(), 400);
+        assert_eq!(points.iter().filter(|point| point.polygon == 0).count(), 100);
+        for point in &points {
+            assert_eq!(point.position.z.to_bits(), [0.1_f64, 2.5][point.polygon as usize].to_bits());
+            assert!(border_distance(&scene, point.polygon, point.position) > 1e-3);
+        }
+        let on_wide = points.iter().filter(|point| point.polygon == 1);
+        let left = on_wide.filter(|point| point.position.x < 1.5).count();
+        assert!(left.abs_diff(150) <= 6, "{left} of 300 in the left half");
+    }
+
+    #[test]
+    fn a_point_with_few_digits_is_put_back_on_its_polygon() {
+        let scene = scene_of(&[(square(0.123456789), black())]);
+        let bvh = Bvh::of_scene(&scene);
+        let surfaces = Surfaces::new(&scene, &bvh);
+        let near = surfaces.receiver_at(DVec3::new(0.5, 0.5, 0.1234568), DVec3::Z * 2.0);
+        assert_eq!((near.polygon, near.position.z), (Some(0), 0.123456789));
+        assert_eq!(surfaces.receiver_at(DVec3::new(0.5, 0.5, 0.1234568), -DVec3::Z).polygon, None);
+        assert_eq!(surfaces.receiver_at(DVec3::new(0.5, 0.5, 0.1235), DVec3::Z).polygon, None);
+        assert_eq!(surfaces.receiver_at(DVec3::new(1.5, 0.5, 0.1234568), DVec3::Z).polygon, None);
+    }
+
+    #[test]
+    fn both_sides_of_a_doubled_polygon_are_seen() {
+        let back: Vec<_> = square(1.0).into_iter().rev().collect();
+        let scene = scene_of(&[(square(0.0), black()), (square(1.0), black()), (back, black())]);
+        let bvh = Bvh::of_scene(&scene);
+        let surfaces = Surfaces::new(&scene, &bvh);
+        let floor = surfaces.receiver_at(DVec3::new(0.4, 0.3, 0.0), DVec3::Z);
+        let seen = surfaces.seen_from(&floor, DVec3::new(0.1, 0.2, 1.0).normalize()).expect("the underside");
+        assert_eq!(seen.polygon, 2);
+        // From the upper side nothing is in the way, not even the lower one.
+        let top = surfaces.receiver_at(DVec3::new(0.4, 0.3, 1.0), DVec3::Z);
+        assert_eq!(top.polygon, Some(1));
+        assert_eq!(surfaces.seen_from(&top, DVec3::Z), None);
+    }
+}
