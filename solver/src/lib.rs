@@ -11,6 +11,7 @@ mod element;
 mod form_factor;
 mod geometry;
 mod irradiance;
+mod linear_fit;
 mod oracle;
 mod quadrature;
 mod reconstruct;

@@ -1,5 +1,7 @@
 //! The oracle: what becomes of a link (Hanrahan, Salzman & Aupperle 1991).
 
+use glam::DVec2;
+
 /// What is known of a link before it is made, at the receiver's sample points.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Estimate {
@@ -7,8 +9,11 @@ pub struct Estimate {
     pub form_factor: f64,
     /// Mean of the visible ones.
     pub visible: f64,
-    /// Largest less smallest of the visible ones, extrapolated from the sample points to the receiver's corners.
-    pub spread: f64,
+    /// Change of the visible form factor per metre along the receiver's u and v, of the plane that fits best.
+    pub gradient: DVec2,
+    /// How far the visible form factor strays from that plane, extrapolated from the sample points to the receiver's
+    /// corners.
+    pub deviation: f64,
 }
 
 /// What is known of the two ends of a link.
@@ -35,9 +40,11 @@ pub enum Refinement {
     DivideSource,
 }
 
-/// Decides by the irradiance, W·m⁻², that the link may misplace: over the receiver B·ΔF, over the source ΔB·F.
+/// Decides by the irradiance, W·m⁻², that the link may misplace: over the receiver B·ΔF, over the source ΔB·F. A link
+/// carries light that is linear over the receiver and constant over the source, so ΔF counts from a plane, ΔB from
+/// the mean.
 pub fn decide(estimate: &Estimate, ends: &Ends, link_error: f64) -> Refinement {
-    let over_receiver = ends.radiosity * estimate.spread;
+    let over_receiver = ends.radiosity * estimate.deviation;
     let over_source = ends.deviation * estimate.visible;
     let receiver = over_receiver > link_error && ends.receiver_divides;
     let source = over_source > link_error && ends.source_divided;
@@ -55,7 +62,7 @@ mod tests {
 
     #[test]
     fn the_larger_error_is_divided_first_and_only_where_it_can_be() {
-        let estimate = Estimate { form_factor: 0.5, visible: 0.2, spread: 0.1 };
+        let estimate = Estimate { form_factor: 0.5, visible: 0.2, deviation: 0.1, ..Estimate::default() };
         let ends = Ends { radiosity: 10.0, deviation: 20.0, receiver_divides: true, source_divided: true };
         assert_eq!(decide(&estimate, &ends, 0.5), Refinement::DivideSource);
         assert_eq!(decide(&estimate, &Ends { deviation: 3.0, ..ends }, 0.5), Refinement::DivideReceiver);

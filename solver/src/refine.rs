@@ -5,7 +5,7 @@
 //! a round are judged in parallel, nodes are divided in order of the pairs between rounds, so that the result does not
 //! depend on the number of threads. A pair is dropped only where a single blocker provably covers its whole shaft.
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 use scene::Scene;
 
@@ -14,9 +14,10 @@ use crate::blocker::Blocker;
 use crate::clip::clip_convex;
 use crate::form_factor::{form_factor, form_factor_at};
 use crate::geometry::Geometry;
+use crate::linear_fit::slope;
 use crate::oracle::{Ends, Estimate, Refinement, decide};
 use crate::visibility::{BlockerInterner, Occlusion, Shaft};
-use crate::{Elements, Link, LinkSource, NodeId};
+use crate::{Elements, Link, LinkSource, NodeId, Patch};
 
 /// Smallest side of an element, as a fraction of the scene's size: where a corner would be refined for ever.
 const SMALLEST_CELL: f64 = 1.0 / 400.0;
@@ -169,6 +170,10 @@ impl Network {
         Some(filter_blockers(&self.geometry, &facing, blockers))
     }
 
+    fn frame(&self, node: NodeId) -> &Patch {
+        &self.elements.patches[self.elements.patch_of(node).unwrap_or_default() as usize]
+    }
+
     fn plane(&self, node: NodeId) -> scene::Plane {
         self.geometry.plane(self.elements.polygon_of(node).unwrap_or_default())
     }
@@ -198,9 +203,10 @@ impl Network {
         let mut fragments = Fragments::new(self.geometry.size);
         let centre = self.elements.nodes[pair.receiver as usize].centre;
         let corners = self.elements.outline(pair.receiver);
+        let frame = self.frame(pair.receiver);
+        let mut samples: Vec<(DVec2, f64)> = Vec::with_capacity(corners.len() + 1);
         let mut estimate = Estimate::default();
-        let (mut least, mut most) = (f64::INFINITY, 0.0f64);
-        for &corner in corners {
+        for corner in corners.iter().copied().chain([centre]) {
             let position = centre + (corner - centre) * SAMPLE_REACH;
             let (unoccluded, visible) = if source.distance(position) > self.geometry.contact_tolerance {
                 let unoccluded = form_factor_at(position, receiver.normal, outline);
@@ -208,11 +214,18 @@ impl Network {
             } else {
                 (0.0, 0.0)
             };
-            estimate.form_factor += unoccluded / corners.len() as f64;
-            estimate.visible += visible / corners.len() as f64;
-            (least, most) = (least.min(visible), most.max(visible));
+            // The quadrature is the corners'; the centre only tells how far the light is from linear.
+            if samples.len() < corners.len() {
+                estimate.form_factor += unoccluded / corners.len() as f64;
+                estimate.visible += visible / corners.len() as f64;
+            }
+            let offset = position - centre;
+            samples.push((DVec2::new(frame.u.dot(offset), frame.v.dot(offset)), visible));
         }
-        estimate.spread = (most - least).max(0.0) / SAMPLE_REACH;
+        let [gradient] = slope(samples.iter().map(|&(at, visible)| (at, [visible - estimate.visible], 1.0)));
+        estimate.gradient = gradient;
+        let strays = |&(at, visible): &(DVec2, f64)| (visible - estimate.visible - gradient.dot(at)).abs();
+        estimate.deviation = samples.iter().map(strays).fold(0.0, f64::max) / SAMPLE_REACH.powi(2);
         estimate
     }
 
@@ -256,6 +269,7 @@ impl Network {
             source: LinkSource::Node(pair.source),
             form_factor: form_factor(self.elements.outline(pair.receiver), self.elements.outline(pair.source)),
             visibility,
+            gradient: estimate.gradient,
             blockers: pair.blockers,
         };
         (link, *estimate)

@@ -1,6 +1,6 @@
 //! The solution: elements, links with their blockers, and the light on every node.
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 use scene::{Rgb, Scene, luminance};
 use serde::{Deserialize, Serialize};
 
@@ -34,6 +34,8 @@ pub struct Link {
     pub form_factor: f64,
     /// Visible fraction, 0..=1, of the form factor at the receiver's sample points.
     pub visibility: f64,
+    /// Change of the visible form factor per metre along the receiver's u and v.
+    pub gradient: DVec2,
     /// What may block it, a list in [`BlockerLists`].
     pub blockers: u32,
 }
@@ -86,7 +88,7 @@ pub struct Interaction {
     pub blockers: Vec<u32>,
 }
 
-/// The irradiance that a node reflects, linear over the node.
+/// The irradiance on a node, linear over the node.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ElementLight {
     /// At the node's centre, W·m⁻²; also the mean over the node.
@@ -134,8 +136,8 @@ pub struct Solution {
     pub first_link: Vec<u32>,
     /// The links' blockers.
     pub blockers: BlockerLists,
-    /// Mean irradiance of each node, W·m⁻².
-    pub irradiance: Vec<Rgb>,
+    /// Irradiance of each node, W·m⁻².
+    pub irradiance: Vec<ElementLight>,
     /// The irradiance that each node reflects: one bounce less than [`Solution::irradiance`].
     pub light: Vec<ElementLight>,
     /// Area-weighted mean irradiance of all surfaces, W·m⁻².

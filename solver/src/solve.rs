@@ -4,7 +4,7 @@ use scene::{Rgb, Scene, luminance};
 
 use crate::cut::{contact_lines, cut_polygon};
 use crate::irradiance::Gather;
-use crate::reconstruct::{constant_light, linear_light};
+use crate::reconstruct::linear_light;
 use crate::refine::{Network, SourceLight};
 use crate::transport::{Transport, transport};
 use crate::{Elements, Solution, SolveOptions};
@@ -46,7 +46,6 @@ pub fn solve(scene: &Scene, options: &SolveOptions, progress: &(dyn Fn(f64) + Sy
     }
     let (elements, blockers) = network.finish();
     let mean_irradiance = mean_irradiance(&elements, &carried);
-    let light = constant_light(&carried.before, &elements);
     let mut solution = Solution {
         elements,
         cuts,
@@ -55,7 +54,7 @@ pub fn solve(scene: &Scene, options: &SolveOptions, progress: &(dyn Fn(f64) + Sy
         first_link,
         blockers,
         irradiance: carried.irradiance,
-        light,
+        light: carried.before,
         mean_irradiance,
         convergence: carried.convergence,
         link_error,
@@ -70,13 +69,12 @@ pub fn solve(scene: &Scene, options: &SolveOptions, progress: &(dyn Fn(f64) + Sy
 
 /// What refinement goes by: radiosity as a source, and how far it varies below each node.
 fn source_light(scene: &Scene, elements: &Elements, transport: &Transport) -> SourceLight {
-    let light = constant_light(&transport.reflected, elements);
     let (radiosity, deviation) = (0..elements.nodes.len() as u32)
         .map(|node| {
             let Some(polygon) = elements.polygon_of(node) else { return (0.0, 0.0) };
-            let (material, light) = (scene.material(polygon), &light[node as usize]);
-            let radiosity = material.reflectance * transport.reflected[node as usize] + material.exitance();
-            // The plane of an inner node counts as variation too: a link carries its source's mean.
+            let (material, light) = (scene.material(polygon), &transport.reflected[node as usize]);
+            let radiosity = material.reflectance * light.irradiance + material.exitance();
+            // A source's own slope counts as variation, too: a link carries its mean.
             let size = elements.nodes[node as usize].cell_max - elements.nodes[node as usize].cell_min;
             let slope = luminance(light.gradient_u.abs() * size.x + light.gradient_v.abs() * size.y) / 2.0;
             (luminance(radiosity), (light.deviation + slope) * luminance(material.reflectance))
@@ -89,6 +87,6 @@ fn source_light(scene: &Scene, elements: &Elements, transport: &Transport) -> So
 fn mean_irradiance(elements: &Elements, transport: &Transport) -> Rgb {
     let area = |leaf: u32| elements.nodes[leaf as usize].area;
     let total: f64 = elements.leaves().map(area).sum();
-    let sum: Rgb = elements.leaves().map(|leaf| transport.irradiance[leaf as usize] * area(leaf)).sum();
+    let sum: Rgb = elements.leaves().map(|leaf| transport.irradiance[leaf as usize].irradiance * area(leaf)).sum();
     if total > 0.0 { sum / total } else { Rgb::ZERO }
 }

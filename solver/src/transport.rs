@@ -3,7 +3,8 @@
 use rayon::prelude::*;
 use scene::{Rgb, Scene, luminance};
 
-use crate::solution::Convergence;
+use crate::linear_fit::fit_inner_nodes;
+use crate::solution::{Convergence, ElementLight};
 use crate::{Elements, Link, LinkSource};
 
 /// The iteration stops when a gather moves less than this fraction of the power that leaves all surfaces: far below
@@ -16,12 +17,12 @@ const MOST_ITERATIONS: u32 = 5000;
 /// The light on all nodes after transport.
 #[derive(Clone, Debug, Default)]
 pub struct Transport {
-    /// Mean irradiance per node, W·m⁻².
-    pub irradiance: Vec<Rgb>,
+    /// Irradiance per node.
+    pub irradiance: Vec<ElementLight>,
     /// The same, one bounce earlier: what the nodes reflect.
-    pub reflected: Vec<Rgb>,
+    pub reflected: Vec<ElementLight>,
     /// Two bounces earlier.
-    pub before: Vec<Rgb>,
+    pub before: Vec<ElementLight>,
     /// How the iteration ended.
     pub convergence: Convergence,
 }
@@ -40,13 +41,14 @@ pub fn transport(
         .map(|node| elements.polygon_of(node).map(|polygon| scene.material(polygon)))
         .map(|material| material.map_or((Rgb::ZERO, Rgb::ZERO), |m| (m.reflectance, m.exitance())))
         .collect();
-    let leaving = |irradiance: &[Rgb]| -> Vec<Rgb> {
-        irradiance.iter().zip(&materials).map(|(&e, &(reflectance, exitance))| reflectance * e + exitance).collect()
+    let leaving = |light: &[ElementLight]| -> Vec<Rgb> {
+        let pairs = light.iter().zip(&materials);
+        pairs.map(|(light, &(reflectance, exitance))| reflectance * light.irradiance + exitance).collect()
     };
     let leaf_power = |radiosity: &dyn Fn(usize) -> f64| -> f64 {
         elements.leaves().map(|leaf| radiosity(leaf as usize) * elements.nodes[leaf as usize].area).sum()
     };
-    let mut result = Transport { irradiance: vec![Rgb::ZERO; nodes], ..Transport::default() };
+    let mut result = Transport { irradiance: vec![ElementLight::default(); nodes], ..Transport::default() };
     result.reflected = result.irradiance.clone();
     let mut radiosity = leaving(&result.irradiance);
     let gathers = bounces.map_or(MOST_ITERATIONS, |bounces| bounces.saturating_add(1).min(MOST_ITERATIONS));
@@ -69,39 +71,44 @@ pub fn transport(
 }
 
 /// Irradiance that arrives at each node over its own links.
-fn gather(links: &[Link], first_link: &[u32], radiosity: &[Rgb]) -> Vec<Rgb> {
+fn gather(links: &[Link], first_link: &[u32], radiosity: &[Rgb]) -> Vec<ElementLight> {
     first_link
         .par_windows(2)
         .with_min_len(64)
         .map(|range| {
-            let links = &links[range[0] as usize..range[1] as usize];
-            links
-                .iter()
-                .map(|link| {
-                    let LinkSource::Node(source) = link.source;
-                    radiosity[source as usize] * (link.form_factor * link.visibility)
-                })
-                .sum()
+            let mut light = ElementLight::default();
+            for link in &links[range[0] as usize..range[1] as usize] {
+                let LinkSource::Node(source) = link.source;
+                let radiosity = radiosity[source as usize];
+                light.irradiance += radiosity * (link.form_factor * link.visibility);
+                light.gradient_u += radiosity * link.gradient.x;
+                light.gradient_v += radiosity * link.gradient.y;
+            }
+            light
         })
         .collect()
 }
 
-/// Adds to every node what its ancestors received, then sets inner nodes to the mean of their children. Children have
-/// higher ids than their parents.
-fn push_pull(elements: &Elements, mut light: Vec<Rgb>) -> Vec<Rgb> {
+/// Adds to every node what its ancestors received, then fits inner nodes to their children. Children have higher ids
+/// than their parents.
+fn push_pull(elements: &Elements, mut light: Vec<ElementLight>) -> Vec<ElementLight> {
     for node in 0..light.len() {
+        let Some(patch) = elements.patch_of(node as u32) else { continue };
+        let (frame, centre) = (&elements.patches[patch as usize], elements.nodes[node].centre);
         let received = light[node];
         for child in elements.children(node as u32) {
-            light[child as usize] += received;
+            let offset = elements.nodes[child as usize].centre - centre;
+            let slope = received.gradient_u * frame.u.dot(offset) + received.gradient_v * frame.v.dot(offset);
+            let child = &mut light[child as usize];
+            child.irradiance += received.irradiance + slope;
+            child.gradient_u += received.gradient_u;
+            child.gradient_v += received.gradient_v;
         }
     }
-    for node in (0..light.len()).rev() {
-        if elements.nodes[node].child_count > 0 {
-            let area = |child: u32| elements.nodes[child as usize].area;
-            let sum: Rgb = elements.children(node as u32).map(|child| light[child as usize] * area(child)).sum();
-            let total: f64 = elements.children(node as u32).map(area).sum();
-            light[node] = sum / total;
-        }
+    // Planes that fall below zero in a shadow would take light from the room.
+    for leaf in elements.leaves() {
+        light[leaf as usize].irradiance = light[leaf as usize].irradiance.max(Rgb::ZERO);
     }
+    fit_inner_nodes(elements, &mut light);
     light
 }

@@ -43,7 +43,7 @@ impl Solution {
                 *exchanged.entry((to, from)).or_default() += transfer * elements.nodes[link.receiver as usize].area;
             }
         }
-        result.bad_numbers += self.irradiance.iter().filter(|e| !e.is_finite() || e.min_element() < 0.0).count() as u32;
+        result.bad_numbers += self.irradiance.iter().filter(|e| !e.irradiance.is_finite() || e.irradiance.min_element() < 0.0).count() as u32;
         let area = |patch: u32| elements.nodes[elements.patches[patch as usize].root as usize].area;
         let mut sums = vec![0.0; elements.patches.len()];
         let mut ordered: Vec<_> = exchanged.iter().collect();
@@ -74,7 +74,7 @@ impl Solution {
             let Some(polygon) = self.elements.polygon_of(leaf) else { continue };
             let (material, area) = (scene.material(polygon), self.elements.nodes[leaf as usize].area);
             emitted += material.exitance() * area;
-            absorbed += (Rgb::ONE - material.reflectance) * self.irradiance[leaf as usize] * area;
+            absorbed += (Rgb::ONE - material.reflectance) * self.irradiance[leaf as usize].irradiance * area;
         }
         (emitted - absorbed).abs().max_element() / emitted.max_element().max(f64::MIN_POSITIVE)
     }
