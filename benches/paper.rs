@@ -1,1 +1,99 @@
-fn main() {}
+//! The figures of Hardt & Teller 1996, section 7, beside this project's, on the machine at hand.
+//!
+//! `cargo bench --bench paper` prints a page for data/record/.
+
+#![allow(clippy::print_stdout, clippy::unwrap_used)]
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::time::Instant;
+
+use scene::Baked;
+use serde_json::Value;
+use viewer::{Capture, Frame, Gpu, Mode, draw_on_cpu};
+
+/// Frames of which the median counts.
+const FRAMES: usize = 41;
+
+/// The parameters that the paper states for its office.
+const OF_THE_PAPER: [&str; 6] = ["--link-error", "0.1", "--discontinuities", "10", "--min-weight", "100"];
+
+fn main() {
+    println!("# The paper's figures and ours\n");
+    println!("Machine: {}, {} threads.", processor(), std::thread::available_parallelism().unwrap());
+    println!("Command: `cargo bench --bench paper`, {}.\n", env!("CARGO_PKG_VERSION"));
+    let (paper, baked) = bake(&OF_THE_PAPER);
+    let (default, _) = bake(&[]);
+    println!("| data/scenes/office.obj | the paper (4 × 250 MHz) | its parameters | default parameters |");
+    println!("|---|---|---|---|");
+    let row = |name: &str, theirs: &str, ours: &dyn Fn(&Value) -> String| {
+        println!("| {name} | {theirs} | {} | {} |", ours(&paper), ours(&default));
+    };
+    let count = |name: &'static str| move |report: &Value| report[name].to_string();
+    let seconds =
+        |name: &'static str| move |report: &Value| format!("{:.2} s", report["seconds"][name].as_f64().unwrap());
+    row("polygons", "about 60", &count("polygons"));
+    row("elements", "1622", &count("elements"));
+    row("links", "–", &count("links"));
+    row("discontinuities followed", "–", &count("discontinuities_kept"));
+    row("triangles", "6576", &count("triangles"));
+    row("solve", "< 2 min", &seconds("solve"));
+    row("mesh and interpolants", "2.5 h", &seconds("mesh"));
+    row("measured error, rms", "–", &|report| format!("{:.3} %", 100.0 * report["error"]["rms"].as_f64().unwrap()));
+    row("peak memory", "–", &|report| {
+        report["peak_memory_bytes"].as_u64().map_or("–".to_owned(), |bytes| format!("{} MB", bytes >> 20))
+    });
+    println!(
+        "\nThe bake with the paper's parameters, drawn; median of {FRAMES} frames, tone map and read-back included.\n"
+    );
+    println!("| drawn by | picture | mode | milliseconds | frames/s (the paper: 2.3 at 640 × 480) |");
+    println!("|---|---|---|---|---|");
+    let gpu = Gpu::headless().ok();
+    for (width, height) in [(640, 480), (1920, 1080)] {
+        for mode in [Mode::Shaded, Mode::Gouraud] {
+            let camera = baked.scene.cameras[0].camera;
+            let frame = Frame { camera, width, height, mode, exposure: None };
+            let exposure = draw_on_cpu(&baked, &frame).exposure;
+            let line = |name: &str, milliseconds: f64| {
+                let rate = 1000.0 / milliseconds;
+                println!("| {name} | {width} × {height} | {} | {milliseconds:.1} | {rate:.1} |", mode.name());
+            };
+            let frame = Frame { exposure: Some(exposure), ..frame };
+            line("CPU, its hierarchy built anew", median_of(|| drop(draw_on_cpu(&baked, &frame))));
+            if let Some(gpu) = &gpu {
+                let capture = Capture::new(gpu, &baked, width, height).unwrap();
+                line(&gpu.adapter_name(), median_of(|| drop(capture.draw(&camera, mode, exposure).unwrap())));
+            }
+        }
+    }
+}
+
+/// Bakes the office with the program itself: its report and the bake.
+fn bake(options: &[&str]) -> (Value, Baked) {
+    let output: PathBuf = Path::new(env!("CARGO_TARGET_TMPDIR")).join("paper.hlf");
+    let mut command = Command::new(env!("CARGO_BIN_EXE_halflight"));
+    command.args(["bake", "data/scenes/office.obj", "--json", "-o"]).arg(&output).args(options);
+    let found = command.current_dir(env!("CARGO_MANIFEST_DIR")).output().unwrap();
+    assert!(found.status.success(), "{}", String::from_utf8_lossy(&found.stderr));
+    (serde_json::from_slice(&found.stdout).unwrap(), formats::read_baked(&output).unwrap())
+}
+
+/// Milliseconds.
+fn median_of(mut work: impl FnMut()) -> f64 {
+    let mut times: Vec<f64> = (0..FRAMES)
+        .map(|_| {
+            let start = Instant::now();
+            work();
+            start.elapsed().as_secs_f64() * 1000.0
+        })
+        .collect();
+    times.sort_by(f64::total_cmp);
+    times[FRAMES / 2]
+}
+
+/// The processor's name, where the system tells.
+fn processor() -> String {
+    let text = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+    let name = text.lines().find_map(|line| line.strip_prefix("model name")?.split_once(": "));
+    name.map_or_else(|| "unknown processor".to_owned(), |(_, name)| name.to_owned())
+}

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::time::UNIX_EPOCH;
 
 use anyhow::{Context, Result, ensure};
-use directories::ProjectDirs;
+use etcetera::BaseStrategy;
 use scene::{Baked, Scene};
 
 use crate::args::LightFlags;
@@ -87,9 +87,8 @@ fn bake_once(scene: &Scene, flags: &LightFlags, outputs: &Outputs) -> Baked {
 
 /// Where the cache keeps a bake.
 fn place(scene: &Scene, flags: &LightFlags) -> Result<PathBuf> {
-    let folders = ProjectDirs::from("", "", "halflight").context("this user has no home folder")?;
-    let folder = folders.cache_dir();
-    std::fs::create_dir_all(folder).with_context(|| format!("cannot make the folder {}", folder.display()))?;
+    let folder = etcetera::choose_base_strategy()?.cache_dir().join("halflight");
+    std::fs::create_dir_all(&folder).with_context(|| format!("cannot make the folder {}", folder.display()))?;
     Ok(folder.join(key(scene, flags)?).with_extension("hlf"))
 }
 

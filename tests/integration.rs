@@ -1,1 +1,17 @@
-//! Integration tests.
+//! What holds the house: one binary of tests over the whole program.
+//!
+//! Pictures and bakes that several tests look at are made once, by [`fixture`].
+
+#![allow(clippy::unwrap_used)]
+
+mod analytic;
+mod architecture;
+mod cli;
+mod determinism;
+mod fixture;
+mod golden;
+mod known_issues;
+mod parity;
+mod readme;
+mod reference;
+mod robustness;
