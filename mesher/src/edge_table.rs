@@ -20,9 +20,9 @@ use crate::frame::Frame;
 use crate::weld::Welder;
 
 /// Points nearer than this fraction of the scene's size (or of its largest coordinate, if that is larger) are one
-/// vertex: 16 roundings of the f32 positions that are stored, so that no triangle collapses when it is rounded; still
-/// a hundredth of a millimetre in a room.
-const WELD: f64 = 1e-6;
+/// vertex. It is about what the f32 positions that are stored can tell apart. Larger would close wider cracks between
+/// polygons that a modeller left apart, but move vertices off lines of contact, to where irradiance is another.
+const WELD: f64 = 1e-7;
 
 /// A discontinuity goes through a vertex that it passes within this fraction of the leaf's diameter. Larger saves
 /// slivers and samples; but where a penumbra is as wide as the leaf, moving its edge costs that fraction of the light.

@@ -1,1 +1,26 @@
-//! placeholder
+//! From a radiosity solution to a mesh of interpolants.
+
+mod arrangement;
+mod bake;
+mod critical_surface;
+mod discontinuity;
+mod edge_table;
+mod facet;
+mod frame;
+mod interval;
+mod leaf_mesh;
+mod probe;
+mod ranking;
+mod samples;
+#[cfg(test)]
+mod testing;
+mod weld;
+
+pub use bake::{BakeOptions, BakeStatistics, bake};
+pub use critical_surface::GrazingRay;
+pub use discontinuity::{Discontinuity, discontinuities};
+pub use edge_table::{EdgeTable, Leaf, LeafSegment, edge_table};
+pub use leaf_mesh::{Mesh, MeshStatistics, MeshTriangle, leaf_meshes};
+pub use probe::{Probes, probe};
+pub use ranking::{RankedLine, rank};
+pub use samples::{Evaluate, Progress, SampleQuery, SampleTable, evaluate_samples, sample_table};

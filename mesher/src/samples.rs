@@ -1,0 +1,264 @@
+//! Samples (Hardt & Teller 1996, section 2.2): irradiance at the vertices and edge midpoints of all triangles.
+//!
+//! Triangles that share an edge share its three samples, so interpolants are continuous by structure and nothing is
+//! computed twice. Where other polygons touch the position, irradiance has one value for each side of the line of
+//! contact, or one for each direction at a corner; there triangles share what is theirs to share.
+
+use std::collections::HashMap;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use glam::DVec3;
+use rayon::prelude::*;
+use scene::{Rgb, Scene};
+use solver::Contact;
+
+use crate::{Leaf, Mesh};
+
+/// A question for irradiance.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SampleQuery {
+    /// Where, metres.
+    pub position: DVec3,
+    /// On which polygon.
+    pub polygon: u32,
+    /// An element (the solver's node) whose closure contains the position.
+    pub element: u32,
+    /// Unit direction in the polygon's plane towards the middle of the triangle that asks: where the value depends on
+    /// the direction of approach, the limit is taken from there.
+    pub inward: DVec3,
+}
+
+/// Irradiance (W·m⁻²) for queries that all name the same element, one value each.
+pub type Evaluate<'a> = &'a (dyn Fn(&[SampleQuery]) -> Vec<Rgb> + Sync);
+
+/// Is told the fraction that is done, 0..=1; from any thread, but never a smaller one than the last in a thread.
+pub type Progress<'a> = &'a (dyn Fn(f64) + Sync);
+
+/// Every sample once, and which of them each triangle uses.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct SampleTable {
+    /// What to evaluate, in the order in which triangles ask; so queries of one element are consecutive.
+    pub queries: Vec<SampleQuery>,
+    /// By triangle, indices of r0 … r5 in the order of [`scene::SAMPLE_BARYCENTRICS`].
+    pub triangles: Vec<[u32; 6]>,
+}
+
+/// A vertex, given twice, or the midpoint between two vertices, the smaller first.
+type Station = [u32; 2];
+
+/// What tells samples at one station of one polygon apart.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+enum Side {
+    /// All triangles agree.
+    Any,
+    /// Those to the left of the line of contact agree.
+    Left,
+    /// Those to the right do.
+    Right,
+    /// The value is one triangle's own.
+    Of(u32),
+}
+
+/// Finds the samples of a mesh. `contact` says how other polygons touch a point of a polygon; it is asked only on
+/// borders of leaves, which is where contact can be.
+pub fn sample_table(
+    scene: &Scene,
+    leaves: &[Leaf],
+    mesh: &Mesh,
+    contact: &(dyn Fn(u32, DVec3) -> Contact + Sync),
+) -> SampleTable {
+    let position = |[a, b]: Station| (mesh.vertices[a as usize] + mesh.vertices[b as usize]) / 2.0;
+    let polygon_of = |leaf: u32| leaves[leaf as usize].polygon;
+
+    let mut on_borders: Vec<(u32, Station)> = Vec::new();
+    for triangle in &mesh.triangles {
+        let stations = stations(triangle.vertices).into_iter().filter(|station| station[1] < mesh.border_vertices);
+        on_borders.extend(stations.map(|station| (polygon_of(triangle.leaf), station)));
+    }
+    on_borders.par_sort_unstable();
+    on_borders.dedup();
+    let contacts: Vec<Contact> =
+        on_borders.par_iter().map(|&(polygon, station)| contact(polygon, position(station))).collect();
+    let contact_at = |polygon: u32, station: Station| {
+        on_borders.binary_search(&(polygon, station)).map_or(Contact::None, |place| contacts[place])
+    };
+
+    let normals: Vec<DVec3> = scene.polygon_ids().map(|polygon| scene.plane(polygon).normal).collect();
+    let mut known: HashMap<(u32, Station, Side), u32> = HashMap::new();
+    let mut table = SampleTable { queries: Vec::new(), triangles: Vec::with_capacity(mesh.triangles.len()) };
+    for (id, triangle) in (0..).zip(&mesh.triangles) {
+        let Leaf { polygon, element, .. } = leaves[triangle.leaf as usize];
+        let middle = triangle.vertices.iter().map(|&vertex| mesh.vertices[vertex as usize]).sum::<DVec3>() / 3.0;
+        let samples = stations(triangle.vertices).map(|station| {
+            let position = position(station);
+            let inward = (middle - position).normalize_or_zero();
+            let side = match contact_at(polygon, station) {
+                Contact::None => Side::Any,
+                Contact::Line { direction } => {
+                    let to_left = normals[polygon as usize].cross(direction);
+                    if inward.dot(to_left) >= 0.0 { Side::Left } else { Side::Right }
+                }
+                Contact::Corner => Side::Of(id),
+            };
+            *known.entry((polygon, station, side)).or_insert_with(|| {
+                table.queries.push(SampleQuery { position, polygon, element, inward });
+                table.queries.len() as u32 - 1
+            })
+        });
+        table.triangles.push(samples);
+    }
+    table
+}
+
+/// The stations of a triangle's samples r0 … r5.
+fn stations([a, b, c]: [u32; 3]) -> [Station; 6] {
+    let middle = |a: u32, b: u32| [a.min(b), a.max(b)];
+    [[a, a], middle(a, b), [b, b], middle(b, c), [c, c], middle(c, a)]
+}
+
+/// Evaluates queries in parallel, those of one element together, each once.
+pub fn evaluate_samples(queries: &[SampleQuery], evaluate: Evaluate<'_>, progress: Progress<'_>) -> Vec<Rgb> {
+    let groups: Vec<&[SampleQuery]> = queries.chunk_by(|a, b| a.element == b.element).collect();
+    let done = AtomicUsize::new(0);
+    let values: Vec<Vec<Rgb>> = groups
+        .par_iter()
+        .map(|group| {
+            let values = evaluate(group);
+            let before = done.fetch_add(group.len(), Ordering::Relaxed);
+            progress((before + group.len()) as f64 / queries.len() as f64);
+            values
+        })
+        .collect();
+    values.concat()
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+
+    use std::sync::Mutex;
+
+    use proptest::prelude::*;
+    use scene::{Interpolant, SAMPLE_BARYCENTRICS};
+
+    use super::*;
+    use crate::testing::{Room, room, scene_of};
+    use crate::{LeafSegment, edge_table, leaf_meshes};
+
+    fn no_contact(_: u32, _: DVec3) -> Contact {
+        Contact::None
+    }
+
+    /// A quadratic of the position, positive over the rooms of the tests.
+    fn quadratic(p: DVec3) -> Rgb {
+        let q = DVec3::new(p.x * p.x - p.y * p.z, p.y * p.y + p.x * p.z, p.z * p.x + 0.5 * p.y * p.x);
+        q + p + 100.0 * (1.0 + p.length_squared())
+    }
+
+    /// A square floor of two leaves along y = 1/2, with a line through both.
+    fn floor() -> (Scene, Vec<Leaf>, Mesh) {
+        let point = |x: f64, y: f64| DVec3::new(x, y, 0.0);
+        let half = |element: u32, y: f64| Leaf {
+            element,
+            polygon: 0,
+            outline: vec![point(0.0, y), point(1.0, y), point(1.0, y + 0.5), point(0.0, y + 0.5)],
+            segments: vec![LeafSegment { ends: [point(0.5, y), point(0.5, y + 0.5)], line: 0 }],
+        };
+        let scene = scene_of(&[vec![point(0., 0.), point(1., 0.), point(1., 1.), point(0., 1.)]]);
+        let leaves = vec![half(7, 0.0), half(8, 0.5)];
+        let mesh = leaf_meshes(&edge_table(&scene, &[], &leaves));
+        (scene, leaves, mesh)
+    }
+
+    #[test]
+    fn no_triangles_have_no_samples() {
+        let table = sample_table(&Scene::default(), &[], &Mesh::default(), &no_contact);
+        assert_eq!(table, SampleTable::default());
+        assert_eq!(evaluate_samples(&[], &|_| unreachable!(), &|_| unreachable!()), []);
+    }
+
+    #[test]
+    fn a_line_of_contact_has_two_values_and_a_corner_one_for_each_triangle() {
+        let (scene, leaves, mesh) = floor();
+        let count = |contact: &(dyn Fn(u32, DVec3) -> Contact + Sync)| {
+            sample_table(&scene, &leaves, &mesh, contact).queries.len()
+        };
+        // 9 vertices and 16 edges.
+        assert_eq!((mesh.triangles.len(), count(&no_contact)), (8, 25));
+        let wall = |_, position: DVec3| {
+            if position.y == 0.5 { Contact::Line { direction: DVec3::X } } else { Contact::None }
+        };
+        assert_eq!(count(&wall), 30);
+        let post = |_, position: DVec3| {
+            if position.distance(DVec3::new(0.5, 0.5, 0.0)) < 1e-9 { Contact::Corner } else { Contact::None }
+        };
+        let middle = mesh.vertices.iter().position(|vertex| vertex.distance(DVec3::new(0.5, 0.5, 0.0)) < 1e-9).unwrap();
+        let around = mesh.triangles.iter().filter(|triangle| triangle.vertices.contains(&(middle as u32))).count();
+        assert_eq!(count(&post), 24 + around);
+
+        let table = sample_table(&scene, &leaves, &mesh, &wall);
+        for (triangle, samples) in mesh.triangles.iter().zip(&table.triangles) {
+            for query in samples.map(|sample| table.queries[sample as usize]) {
+                assert!((query.inward.length() - 1.0).abs() < 1e-12);
+                if query.position.y == 0.5 {
+                    // The limit is taken from the triangle's own side, and asked of a leaf on that side.
+                    assert_eq!(query.inward.y > 0.0, triangle.leaf == 1);
+                    assert_eq!(query.element, leaves[triangle.leaf as usize].element);
+                }
+            }
+        }
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(60))]
+
+        #[test]
+        fn quadratics_are_reproduced_from_samples_evaluated_once(Room { scene, leaves } in room()) {
+            let mesh = leaf_meshes(&edge_table(&scene, &[], &leaves));
+            let table = sample_table(&scene, &leaves, &mesh, &no_contact);
+            let scale = scene.size();
+            let asked = Mutex::new(Vec::new());
+            let reported = Mutex::new(0.0f64);
+            let evaluate = |queries: &[SampleQuery]| {
+                asked.lock().unwrap().extend(queries.iter().map(|q| (q.polygon, (q.position / scale).to_array().map(f64::to_bits))));
+                assert!(queries.iter().all(|query| query.element == queries[0].element));
+                queries.iter().map(|query| quadratic(query.position / scale)).collect()
+            };
+            let report = |fraction: f64| { let mut last = reported.lock().unwrap(); *last = last.max(fraction); };
+            let values = evaluate_samples(&table.queries, &evaluate, &report);
+            prop_assert_eq!(*reported.lock().unwrap(), 1.0);
+
+            // One evaluation for every vertex and edge of each polygon, none at one place twice.
+            let mut asked = asked.into_inner().unwrap();
+            asked.sort_unstable();
+            let all = asked.len();
+            asked.dedup();
+            prop_assert_eq!((asked.len(), values.len()), (all, all));
+
+            for (triangle, samples) in mesh.triangles.iter().zip(&table.triangles) {
+                let interpolant = Interpolant::through(samples.map(|sample| values[sample as usize]));
+                let [a, b, c] = triangle.vertices.map(|vertex| mesh.vertices[vertex as usize]);
+                for (s, t) in SAMPLE_BARYCENTRICS.into_iter().chain([(0.2, 0.3), (0.1, 0.85), (1.0 / 3.0, 1.0 / 3.0)]) {
+                    let exact = quadratic((a * (1.0 - s - t) + b * s + c * t) / scale);
+                    let error = (interpolant.evaluate(s, t) - exact).abs().max_element();
+                    prop_assert!(error <= 1e-12 * exact.max_element(), "{error} of {exact}");
+                }
+            }
+        }
+
+        #[test]
+        fn any_number_of_threads_gives_the_same(Room { scene, leaves } in room()) {
+            let run = |threads: usize| {
+                let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+                pool.install(|| {
+                    let mesh = leaf_meshes(&edge_table(&scene, &[], &leaves));
+                    let table = sample_table(&scene, &leaves, &mesh, &no_contact);
+                    let evaluate = |queries: &[SampleQuery]| queries.iter().map(|query| quadratic(query.position)).collect();
+                    let values = evaluate_samples(&table.queries, &evaluate, &|_| ());
+                    (mesh, table, values)
+                })
+            };
+            prop_assert!(run(1) == run(4));
+        }
+    }
+}
