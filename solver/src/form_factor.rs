@@ -13,7 +13,7 @@ use crate::contour::{double_contour, edges, segment_distance};
 use crate::quadrature::{MOST_POINTS, gauss_legendre, points_needed};
 
 /// Points of the far method from which on the contour integral is cheaper, at full accuracy of both.
-const MOST_FAR_POINTS: usize = 64;
+const MOST_FAR_POINTS: usize = 40;
 
 /// Evaluations of the kernel between two points that take as long as one edge in Lambert's formula.
 const KERNELS_PER_EDGE: usize = 12;
@@ -32,12 +32,6 @@ const COPLANAR: f64 = 1e-12;
 /// the limit from either side.
 pub fn point_form_factor(directions: &[DVec3], normal: DVec3) -> f64 {
     fraction(edges(directions).map(|[from, to]| edge_term(from, to, normal)).sum())
-}
-
-/// Clips a convex cone from the origin, given by the directions of its corners, by the half space normal·d ≥ 0, and
-/// appends what is left to `out`.
-pub fn clip_cone(directions: &[DVec3], normal: DVec3, out: &mut Vec<DVec3>) {
-    clip_convex(directions, 0.0, |direction| normal.dot(direction), out);
 }
 
 /// Form factor from a surface element at `position` (metres) with the unit vector `normal` to a convex polygon, 0..=1.
@@ -191,11 +185,20 @@ fn polygon_rule(outline: &[DVec3], distance: f64) -> Option<Vec<(DVec3, f64)>> {
     Some(nodes)
 }
 
-/// Distance between two convex polygons that do not cross each other.
+/// Distance between two convex polygons that do not cross each other, or something less if they are far apart.
 fn polygon_distance(a: &[DVec3], b: &[DVec3]) -> f64 {
-    let between_edges = edges(a)
-        .map(|x| edges(b).map(|y| segment_distance(x, y)).fold(f64::INFINITY, f64::min))
-        .fold(f64::INFINITY, f64::min);
+    // Balls around them give the distance soon, once they are small before it.
+    let ball = |outline: &[DVec3]| {
+        let centre = outline.iter().sum::<DVec3>() / outline.len() as f64;
+        (centre, outline.iter().map(|corner| corner.distance(centre)).fold(0.0, f64::max))
+    };
+    let ((centre_a, radius_a), (centre_b, radius_b)) = (ball(a), ball(b));
+    let between_balls = centre_a.distance(centre_b) - radius_a - radius_b;
+    if between_balls > 4.0 * (radius_a + radius_b) {
+        return between_balls;
+    }
+    let to_edges = |edge| edges(b).map(|other| segment_distance(edge, other)).fold(f64::INFINITY, f64::min);
+    let between_edges = edges(a).map(to_edges).fold(f64::INFINITY, f64::min);
     between_edges.min(face_distance(a, b)).min(face_distance(b, a))
 }
 
@@ -322,7 +325,7 @@ mod tests {
             let deep = parallelogram(v(0., c, -5.0), DVec3::X * a, DVec3::Z * (b + 5.0));
             assert_close(form_factor_at(DVec3::ZERO, DVec3::Z, &deep), exact, 1e-12);
             let mut clipped = Vec::new();
-            clip_cone(&deep, DVec3::Z, &mut clipped);
+            clip_convex(&deep, 0.0, |direction| direction.z, &mut clipped);
             assert_close(point_form_factor(&clipped, DVec3::Z), exact, 1e-12);
         }
     }
@@ -487,7 +490,7 @@ mod tests {
         fn streaming_clip_is_clip_then_sum(position in corner(), outline in [corner(), corner(), corner()]) {
             let directions = outline.map(|corner| corner - position);
             let mut clipped = Vec::new();
-            clip_cone(&directions, DVec3::Z, &mut clipped);
+            clip_convex(&directions, 0.0, |direction| direction.z, &mut clipped);
             let value = form_factor_at(position, DVec3::Z, &outline);
             prop_assert!((value - point_form_factor(&clipped, DVec3::Z)).abs() < 1e-14);
             prop_assert!((value - form_factor_at(position, DVec3::Z, &reversed(outline))).abs() < 1e-14);

@@ -36,6 +36,7 @@ pub struct Shaft<'a> {
     ends: [&'a [DVec3]; 2],
     /// The shaft is where all distances are ≥ 0.
     planes: Vec<Plane>,
+    /// Corners of the box around it.
     low: DVec3,
     high: DVec3,
     tolerance: f64,
@@ -57,11 +58,6 @@ impl<'a> Shaft<'a> {
             }
         }
         shaft
-    }
-
-    /// Corners of the axis-aligned box around the shaft, metres.
-    pub fn bounds(&self) -> (DVec3, DVec3) {
-        (self.low, self.high)
     }
 
     /// Adds the side through an edge of one end that just holds the other end.
@@ -259,7 +255,6 @@ mod tests {
     fn blockers_between_two_squares() {
         let (a, b) = (square(0., 0., 1., 0.), reversed(square(0., 0., 0.5, 2.)));
         let shaft = Shaft::between(&a, &b);
-        assert_eq!(shaft.bounds(), (v(-1., -1., 0.), v(1., 1., 2.)));
         // Two ends and four sides that both ends' edges share.
         assert_eq!(shaft.planes.len(), 6);
         // Half way up the shaft is 1.5 wide.
