@@ -1,0 +1,352 @@
+//! The discontinuities of irradiance on a receiver (Hardt & Teller 1996, section 4.1): horizon lines, and the EV and VE
+//! swaths between its sources and their blockers.
+//!
+//! Only actual discontinuities are reported. A swath ends where it leaves the receiver, and everything that stands in
+//! it casts a gap; what is left of one event may be several segments.
+//!
+//! What we do differently: sources are whole polygons, not the links' elements, so that a line does not depend on how
+//! far the solver divided its source; and a bound on the weight of section 4.2 is tested before a swath is built.
+
+use glam::DVec3;
+use scene::{HalfEdges, LineKind, Plane, Scene};
+use solver::Interaction;
+
+use crate::critical_surface::{Apex, GrazingRay, Pencil, Receiver, Swath, edges};
+use crate::facet::Facets;
+use crate::interval::{Interval, Intervals, clip};
+use crate::ranking::{CONTACT_FLOOR, Horizon, swath_weight};
+
+/// A line on a receiver across which a derivative of irradiance jumps.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Discontinuity {
+    /// The event that makes it.
+    pub kind: LineKind,
+    /// Receiving polygon.
+    pub receiver: u32,
+    /// Source polygon.
+    pub source: u32,
+    /// Polygon whose edge or vertex is grazed, that of smaller id where two share it; the source for a horizon line.
+    pub blocker: u32,
+    /// Pieces of one event share its number, which counts up over the receiver's discontinuities.
+    pub event: u32,
+    /// Ends in the receiver's plane, metres.
+    pub ends: [DVec3; 2],
+    /// The rays that graze the blocker on their way to the ends; for a horizon line they touch the source's nearest
+    /// corner only.
+    pub rays: [GrazingRay; 2],
+    /// Luminance of the source's radiosity, W·m⁻².
+    pub radiosity: f64,
+    /// Weight of the whole event on this receiver, W·m⁻² (section 4.2); see [`rank`](crate::rank) for a leaf's.
+    pub weight: f64,
+}
+
+/// The discontinuities of weight at least `min_weight` (W·m⁻²) that the interactions of a receiver cause on it.
+///
+/// The weight is that of a whole event on the whole receiver, so that all its leaves agree on which lines there are.
+/// `half_edges` must be the scene's own. Interactions that name polygons which do not exist are passed over. The order
+/// is that of the interactions, within one of them by event, within an event along the line.
+pub fn discontinuities(
+    scene: &Scene,
+    half_edges: &HalfEdges,
+    receiver: u32,
+    interactions: &[Interaction],
+    min_weight: f64,
+) -> Vec<Discontinuity> {
+    let count = scene.polygons.len() as u32;
+    let exists = |interaction: &Interaction| {
+        interaction.source.max(receiver) < count && interaction.blockers.iter().all(|&blocker| blocker < count)
+    };
+    let interactions: Vec<&Interaction> = interactions.iter().filter(|interaction| exists(interaction)).collect();
+    if interactions.is_empty() {
+        return Vec::new();
+    }
+    let facets = Facets::around(scene, half_edges, receiver, &interactions);
+    let Some(target) = Receiver::new(&scene.outline(receiver), facets.tolerance) else { return Vec::new() };
+    let mut search = Search {
+        id: receiver,
+        floor: CONTACT_FLOOR * target.diameter,
+        receiver: target,
+        min_weight,
+        found: Vec::new(),
+        events: 0,
+        blocker_of: vec![NONE; scene.polygons.len()],
+        vertex_of: vec![NONE; scene.vertices.len()],
+        facets,
+    };
+    for (number, interaction) in (0..).zip(interactions) {
+        if let Some(case) = search.case(number, interaction) {
+            search.horizon(&case);
+            search.vertex_edge(&case);
+            search.edge_vertex(&case);
+        }
+    }
+    search.found
+}
+
+/// No interaction's number.
+const NONE: u32 = u32::MAX;
+
+/// What the search for a receiver's discontinuities carries along.
+struct Search<'a> {
+    facets: Facets<'a>,
+    id: u32,
+    receiver: Receiver,
+    /// Least distance from blocker to receiver that weights count with, metres.
+    floor: f64,
+    min_weight: f64,
+    found: Vec<Discontinuity>,
+    events: u32,
+    /// By polygon, the last interaction whose strong blocker it was.
+    blocker_of: Vec<u32>,
+    /// By vertex, the last interaction that it was looked at in.
+    vertex_of: Vec<u32>,
+}
+
+/// One interaction, prepared.
+struct Case {
+    number: u32,
+    source: u32,
+    radiosity: f64,
+    plane: Plane,
+    /// The source's corners, without those that lie on a straight side: nothing changes where light leaves them.
+    outline: Vec<DVec3>,
+    /// Everything that may stand in a swath.
+    occluders: Vec<u32>,
+    /// The occluders that may cause a discontinuity of sufficient weight.
+    strong: Vec<u32>,
+}
+
+impl Case {
+    /// 1 for a source in front of a plane, −1 behind it, 0 on both sides or in it.
+    fn side_of(&self, plane: &Plane, tolerance: f64) -> f64 {
+        let is_behind = self.outline.iter().any(|&corner| plane.distance(corner) < -tolerance);
+        let is_in_front = self.outline.iter().any(|&corner| plane.distance(corner) > tolerance);
+        f64::from(i8::from(is_in_front) - i8::from(is_behind))
+    }
+}
+
+impl Search<'_> {
+    /// Prepares an interaction; none if no light can pass.
+    fn case(&mut self, number: u32, interaction: &Interaction) -> Option<Case> {
+        let Interaction { source, radiosity, .. } = *interaction;
+        let tolerance = self.facets.tolerance;
+        let facet = *self.facets.get(source);
+        let rises = |plane: &Plane, polygon| self.facets.corners(polygon).any(|p| plane.distance(p) > tolerance);
+        if source == self.id || !rises(&facet.plane, self.id) || !rises(&self.receiver.plane, source) {
+            return None;
+        }
+        let is_between = |&polygon: &u32| {
+            polygon != source
+                && polygon != self.id
+                && rises(&facet.plane, polygon)
+                && rises(&self.receiver.plane, polygon)
+        };
+        let occluders: Vec<u32> = interaction.blockers.iter().copied().filter(is_between).collect();
+        let can_matter = |&blocker: &u32| {
+            let blocker = self.facets.get(blocker);
+            let longest = facet.centre.distance(blocker.centre) + facet.radius + blocker.radius;
+            radiosity * longest >= self.min_weight * blocker.clearance.max(self.floor)
+        };
+        let strong: Vec<u32> = occluders.iter().copied().filter(can_matter).collect();
+        for &blocker in &strong {
+            self.blocker_of[blocker as usize] = number;
+        }
+        let outline = without_flat_corners(&self.facets.corners(source).collect::<Vec<_>>(), tolerance);
+        Some(Case { number, source, radiosity, plane: facet.plane, outline, occluders, strong })
+    }
+
+    /// Swaths between the source's vertices and the blockers' silhouette edges.
+    fn vertex_edge(&mut self, case: &Case) {
+        for &blocker in &case.strong {
+            for half_edge in self.facets.half_edges_of(blocker) {
+                let is_strong = |twin| self.blocker_of[self.facets.polygon(twin) as usize] == case.number;
+                if self.facets.twin(half_edge).is_some_and(|twin| twin < half_edge && is_strong(twin)) {
+                    continue;
+                }
+                let edge = [self.facets.start(half_edge), self.facets.end(half_edge)];
+                for &apex in &case.outline {
+                    let pencil = Pencil { apex, edge, at: Apex::Source };
+                    if let Some(rays) = self.landing(case, &pencil)
+                        && self.facets.is_silhouette(half_edge, apex)
+                    {
+                        self.trace(case, blocker, &pencil, Intervals::from(rays));
+                    }
+                }
+            }
+        }
+    }
+
+    /// Swaths between the source's edges and the corners of the blockers' silhouettes.
+    fn edge_vertex(&mut self, case: &Case) {
+        for &blocker in &case.strong {
+            for half_edge in self.facets.half_edges_of(blocker) {
+                let visited = &mut self.vertex_of[self.facets.vertex(half_edge) as usize];
+                if std::mem::replace(visited, case.number) == case.number {
+                    continue;
+                }
+                let apex = self.facets.start(half_edge);
+                for edge in edges(&case.outline) {
+                    let pencil = Pencil { apex, edge, at: Apex::Blocker };
+                    if let Some(rays) = self.landing(case, &pencil) {
+                        let rays = self.facets.silhouette_corner(half_edge, edge, rays);
+                        self.trace(case, blocker, &pencil, rays);
+                    }
+                }
+            }
+        }
+    }
+
+    /// The rays of a pencil that could reach the receiver, if the line where they meet it divides it and is strong
+    /// enough. Along a line the ratio of distances is monotone, so that its ends bound the weight.
+    fn landing(&self, case: &Case, pencil: &Pencil) -> Option<Interval> {
+        let rays = pencil.landing(&case.plane, &self.receiver)?;
+        let ends = rays.map(|u| pencil.point(u, &self.receiver.plane));
+        let divides = ends[0].distance(ends[1]) > self.facets.tolerance && !self.receiver.is_on_border(ends);
+        (divides && self.weight(case, pencil, rays, ends) >= self.min_weight).then_some(rays)
+    }
+
+    fn weight(&self, case: &Case, pencil: &Pencil, rays: Interval, ends: [DVec3; 2]) -> f64 {
+        let weight = |i: usize| swath_weight(case.radiosity, pencil.ray(rays[i]), ends[i], self.floor);
+        weight(0).max(weight(1))
+    }
+
+    /// Takes out of a swath what is stopped on its way and records the rest.
+    fn trace(&mut self, case: &Case, blocker: u32, pencil: &Pencil, mut rays: Intervals) {
+        let Some(swath) = Swath::new(*pencil, self.facets.tolerance) else { return };
+        for &occluder in &case.occluders {
+            if rays.is_empty() {
+                return;
+            }
+            self.stop(case, occluder, &swath, &mut rays);
+        }
+        let kind = if pencil.at == Apex::Source { LineKind::VertexEdge } else { LineKind::EdgeVertex };
+        let first = self.found.len();
+        for piece in rays.iter() {
+            let ends = piece.map(|u| pencil.point(u, &self.receiver.plane));
+            let weight = self.weight(case, pencil, piece, ends);
+            self.record(case, kind, blocker, ends, piece.map(|u| pencil.ray(u)), weight);
+        }
+        self.close_event(first);
+    }
+
+    /// Takes out of a swath the rays that one polygon stops. A polygon that only touches the swath's plane, as the
+    /// faces at the grazed edge do, stops none.
+    fn stop(&self, case: &Case, occluder: u32, swath: &Swath, rays: &mut Intervals) {
+        let Pencil { apex, edge, at } = swath.pencil;
+        let tolerance = self.facets.tolerance;
+        let plane = self.facets.get(occluder).plane;
+        if plane.distance(apex).abs() > tolerance {
+            let Some(section) = self.facets.section(occluder, &swath.plane, false) else { return };
+            if section.iter().any(|&end| case.plane.distance(end) > tolerance) {
+                swath.stopped(section, &self.receiver).into_iter().flatten().for_each(|stopped| rays.subtract(stopped));
+            } else if edge.iter().all(|&end| plane.distance(end).abs() <= tolerance)
+                && case.side_of(&plane, tolerance) * plane.distance(apex) < 0.0
+            {
+                // The source's edge lies on the polygon, and the blocker is behind it.
+                rays.subtract(project(section, edge));
+            }
+        } else if self.facets.contains(occluder, apex) {
+            match at {
+                // A vertex in the middle of another polygon is no corner of the outline.
+                Apex::Blocker => rays.clear(),
+                // A source's corner there is hidden from the other side of the polygon than the source's.
+                Apex::Source => {
+                    let beyond = edge.map(|end| -case.side_of(&plane, tolerance) * plane.distance(end));
+                    let mut hidden = [0.0, 1.0];
+                    if beyond[0].max(beyond[1]) > tolerance && clip(&mut hidden, beyond[0], beyond[1]) {
+                        rays.subtract(hidden);
+                    }
+                }
+            }
+        }
+    }
+
+    /// The line in which the source's plane meets the receiver, as far as some of the source is seen from it: one of
+    /// its corners or its centre, of the part in front of the receiver.
+    fn horizon(&mut self, case: &Case) {
+        let tolerance = self.facets.tolerance;
+        let Some(line) = self.facets.section(self.id, &case.plane, false) else { return };
+        let Some(horizon) = Horizon::new(&case.outline, &case.plane, &self.receiver.plane) else { return };
+        if case.radiosity * horizon.weight(line, self.floor) < self.min_weight {
+            return;
+        }
+        let section = |&occluder: &u32| self.facets.section(occluder, &case.plane, true);
+        let sections: Vec<[DVec3; 2]> = case.occluders.iter().filter_map(section).collect();
+        let mut seen = Intervals::default();
+        for apex in horizon.probes().filter(|&probe| self.receiver.plane.distance(probe) > tolerance) {
+            let Some(swath) = Swath::new(Pencil { apex, edge: line, at: Apex::Source }, tolerance) else { continue };
+            let mut rays = Intervals::from([0.0, 1.0]);
+            for &section in &sections {
+                if !is_on_line(apex, section, tolerance) {
+                    swath.stopped(section, &self.receiver).into_iter().flatten().for_each(|gap| rays.subtract(gap));
+                }
+            }
+            seen.unite(&rays);
+        }
+        // Where the source itself stands on the line, the solver has cut the receiver.
+        if let Some(contact) = self.facets.section(case.source, &self.receiver.plane, true) {
+            seen.subtract(project(contact, line));
+        }
+        let first = self.found.len();
+        for piece in seen.iter() {
+            let ends = piece.map(|u| line[0].lerp(line[1], u));
+            let rays = ends.map(|end| {
+                let corner = horizon.nearest_corner(end);
+                GrazingRay { source: corner, blocker: corner }
+            });
+            let weight = case.radiosity * horizon.weight(ends, self.floor);
+            self.record(case, LineKind::Horizon, case.source, ends, rays, weight);
+        }
+        self.close_event(first);
+    }
+
+    fn record(
+        &mut self,
+        case: &Case,
+        kind: LineKind,
+        blocker: u32,
+        ends: [DVec3; 2],
+        rays: [GrazingRay; 2],
+        weight: f64,
+    ) {
+        if ends[0].distance(ends[1]) > self.facets.tolerance {
+            let (receiver, source, radiosity, event) = (self.id, case.source, case.radiosity, self.events);
+            self.found.push(Discontinuity { kind, receiver, source, blocker, event, ends, rays, radiosity, weight });
+        }
+    }
+
+    /// Gives the pieces from `first` on, which are one event, their common weight, or drops them if it is too small.
+    fn close_event(&mut self, first: usize) {
+        let weight = self.found[first..].iter().map(|piece| piece.weight).fold(0.0, f64::max);
+        if weight < self.min_weight {
+            self.found.truncate(first);
+        }
+        if first < self.found.len() {
+            self.found[first..].iter_mut().for_each(|piece| piece.weight = weight);
+            self.events += 1;
+        }
+    }
+}
+
+/// The parameters along a segment between which another on the same line lies.
+fn project(other: [DVec3; 2], [from, to]: [DVec3; 2]) -> Interval {
+    let along = (to - from) / from.distance_squared(to);
+    let [a, b] = other.map(|point| (point - from).dot(along));
+    [a.min(b), a.max(b)]
+}
+
+/// Whether the line of a segment passes through a point.
+fn is_on_line(point: DVec3, [from, to]: [DVec3; 2], tolerance: f64) -> bool {
+    (to - from).cross(point - from).length() <= tolerance * from.distance(to)
+}
+
+/// An outline without the corners at which it does not turn.
+fn without_flat_corners(outline: &[DVec3], tolerance: f64) -> Vec<DVec3> {
+    let count = outline.len();
+    let turns =
+        |&i: &usize| !is_on_line(outline[i], [outline[(i + count - 1) % count], outline[(i + 1) % count]], tolerance);
+    (0..count).filter(turns).map(|i| outline[i]).collect()
+}
+
+#[cfg(test)]
+pub(crate) mod tests;
