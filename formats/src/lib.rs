@@ -1,1 +1,29 @@
-//! placeholder
+//! Bytes ↔ the types of `scene`: scene files, bakes, images and tables of points.
+//!
+//! Reading trusts nothing and panics on no input; every error names the file, the place, the cause and the cure.
+//! Every file is written under a temporary name and renamed, so that none is ever half there.
+
+mod atomic_file;
+mod baked_file;
+mod camera;
+mod convex;
+mod error;
+mod face;
+mod image_file;
+mod import;
+mod material_library;
+mod merge;
+mod obj;
+mod obj_text;
+mod points_csv;
+mod record;
+mod report;
+mod weld;
+
+pub use atomic_file::write_atomically;
+pub use baked_file::{is_baked, read_baked, write_baked};
+pub use error::FormatError;
+pub use image_file::{read_exr, read_png, write_exr, write_png};
+pub use import::{Imported, read_scene};
+pub use points_csv::{SurfaceQuery, read_points, write_irradiance};
+pub use report::ImportReport;

@@ -7,7 +7,7 @@ use crate::{Material, NamedCamera, Plane, Polygon, Rgb, area_vector};
 
 /// Largest coordinate accepted, metres. Beyond it f32 positions in a viewer would be off by more than a
 /// centimetre, and nobody models a room there on purpose: the units are wrong.
-const LARGEST_COORDINATE: f64 = 1e5;
+pub const LARGEST_COORDINATE: f64 = 1e5;
 
 /// Polygons, materials and cameras; flat arrays that refer to each other by index.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]

@@ -1,0 +1,120 @@
+//! Wavefront OBJ: text → checked text → tobj → faces with their materials, objects and cameras.
+
+use std::collections::HashMap;
+use std::fs;
+use std::path::Path;
+
+use glam::DVec3;
+use scene::{Material, NamedCamera};
+
+use crate::FormatError;
+use crate::face::{Corner, Face};
+use crate::material_library::read_materials;
+use crate::obj_text::{self, ObjText};
+use crate::report::{ImportReport, counted};
+
+/// A file as it is written: nothing welded, split or merged yet.
+#[derive(Debug, Default)]
+pub(crate) struct Model {
+    /// Positions, metres; each object has its own, and equal ones may repeat.
+    pub positions: Vec<DVec3>,
+    /// Faces in the order of the file.
+    pub faces: Vec<Face>,
+    pub materials: Vec<Material>,
+    pub objects: Vec<String>,
+    pub cameras: Vec<NamedCamera>,
+}
+
+/// Reads an OBJ file and the MTL files that it names.
+pub(crate) fn read_obj(path: &Path, report: &mut ImportReport) -> Result<Model, FormatError> {
+    let bytes = fs::read(path).map_err(|error| FormatError::read(path, error))?;
+    if bytes.len() > u32::MAX as usize {
+        return Err(FormatError::content(path, "is larger than 4 GiB", "split the scene"));
+    }
+    // Names and comments may be in any encoding; the rest is ASCII.
+    let text = obj_text::check(path, &String::from_utf8_lossy(&bytes))?;
+    if text.face_lines.is_empty() {
+        return Err(FormatError::content(path, "has no faces", "export the scene as polygons"));
+    }
+    report.polygons_read = text.face_lines.len();
+    warn_of_text(&text, report);
+    let materials = read_materials(path, &text.libraries, &text.materials, report)?;
+    let names =
+        materials.list.iter().map(|material| tobj::Material { name: material.name.clone(), ..Default::default() });
+    let library = (names.collect::<Vec<_>>(), materials.index);
+    let clean = format!("mtllib all\n{}", text.clean);
+    let (meshes, _) = tobj::load_obj_buf(&mut clean.as_bytes(), &tobj::LoadOptions::default(), |_| Ok(library.clone()))
+        .map_err(|error| FormatError::content(path, format!("is no OBJ file ({error})"), "export the file again"))?;
+
+    let mut model = Model { materials: materials.list, cameras: named(&text), ..Model::default() };
+    let (mut objects, mut seams, mut unassigned) = (HashMap::new(), HashMap::new(), None);
+    let mut lines = text.face_lines.iter().copied();
+    for tobj::Model { mesh, name } in meshes {
+        // tobj leaves the list out where all faces are triangles.
+        let triangles = if mesh.face_arities.is_empty() { mesh.indices.len() / 3 } else { 0 };
+        let sizes: Vec<usize> =
+            mesh.face_arities.iter().map(|&size| size as usize).chain(std::iter::repeat_n(3, triangles)).collect();
+        if sizes.is_empty() {
+            continue;
+        }
+        let object = *objects.entry(name.clone()).or_insert_with(|| {
+            model.objects.push(name);
+            model.objects.len() as u32 - 1
+        });
+        let material = mesh.material_id.unwrap_or_else(|| {
+            *unassigned.get_or_insert_with(|| {
+                model.materials.push(Material::grey("unassigned"));
+                report.missing_materials += 1;
+                report.warn("faces before the first usemtl became a grey of reflectance 0.5; give them a material");
+                model.materials.len() - 1
+            })
+        }) as u32;
+        let first_vertex = model.positions.len() as u32;
+        model.positions.extend(mesh.positions.as_chunks().0.iter().map(|&position| DVec3::from_array(position)));
+        let mut corners = (0..mesh.indices.len()).map(|i| {
+            let count = seams.len() as u32;
+            Corner { vertex: first_vertex + mesh.indices[i], seam: *seams.entry(attributes(&mesh, i)).or_insert(count) }
+        });
+        for (size, line) in sizes.into_iter().zip(&mut lines) {
+            model.faces.push(Face { corners: corners.by_ref().take(size).collect(), material, object, line });
+        }
+    }
+    Ok(model)
+}
+
+/// What a corner has beside its position, texture coordinate and shading normal, as bits that can be compared.
+fn attributes(mesh: &tobj::Mesh, corner: usize) -> [u64; 5] {
+    let mut bits = [0; 5];
+    let texture = mesh.texcoord_indices.get(corner).map(|&i| &mesh.texcoords[2 * i as usize..][..2]);
+    let normal = mesh.normal_indices.get(corner).map(|&i| &mesh.normals[3 * i as usize..][..3]);
+    let values = texture.unwrap_or(&[0.0; 2]).iter().chain(normal.unwrap_or(&[0.0; 3]));
+    for (bits, value) in bits.iter_mut().zip(values) {
+        *bits = value.to_bits();
+    }
+    bits
+}
+
+/// The cameras by name: camera, camera2, camera3 …
+fn named(text: &ObjText) -> Vec<NamedCamera> {
+    let name = |i: usize| if i == 0 { "camera".to_owned() } else { format!("camera{}", i + 1) };
+    text.cameras.iter().enumerate().map(|(i, &camera)| NamedCamera { name: name(i), camera }).collect()
+}
+
+fn warn_of_text(text: &ObjText, report: &mut ImportReport) {
+    if let Some(line) = text.bad_cameras.first() {
+        report.warn(format!(
+            "{} skipped, the first in line {line}: write `# camera eye X Y Z dir X Y Z up X Y Z fov_deg D`",
+            counted(
+                text.bad_cameras.len(),
+                "camera comment says no valid camera and was",
+                "camera comments say no valid camera and were"
+            ),
+        ));
+    }
+    if let Some(line) = text.free_form.first() {
+        report.warn(format!(
+            "{} skipped, the first in line {line}: export the scene as polygons",
+            counted(text.free_form.len(), "free-form curve or surface was", "free-form curves or surfaces were"),
+        ));
+    }
+}

@@ -1,0 +1,42 @@
+//! What an import found and did.
+
+/// Counts of what an import found and repaired, and a sentence for each thing that a user should know.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct ImportReport {
+    /// Faces in the file.
+    pub polygons_read: usize,
+    /// Positions that became one with an earlier, equal or very near one. Objects that share a vertex of the file count
+    /// it once each.
+    pub welded_vertices: usize,
+    /// Faces of fewer than three distinct corners or without area: skipped.
+    pub degenerate_faces: usize,
+    /// Faces whose outline crosses itself: skipped.
+    pub crossing_faces: usize,
+    /// Faces that repeat an earlier one, corner for corner with the same front: skipped.
+    pub repeated_faces: usize,
+    /// Faces that were not planar: split into planar pieces.
+    pub non_planar_faces: usize,
+    /// Planar faces that were not convex: split into convex pieces.
+    pub concave_faces: usize,
+    /// By how many polygons the merging of triangles made the scene smaller.
+    pub merged_faces: usize,
+    /// Materials that faces use and no library defines: grey.
+    pub missing_materials: usize,
+    /// Materials whose reflectance was limited.
+    pub clamped_materials: usize,
+    /// Materials with a texture, which is not read.
+    pub textured_materials: usize,
+    /// One sentence for each kind of problem: how many, where the first is, what was done, and the cure.
+    pub warnings: Vec<String>,
+}
+
+impl ImportReport {
+    pub(crate) fn warn(&mut self, sentence: impl Into<String>) {
+        self.warnings.push(sentence.into());
+    }
+}
+
+/// A count and its noun.
+pub(crate) fn counted(count: usize, one: &str, many: &str) -> String {
+    format!("{count} {}", if count == 1 { one } else { many })
+}
