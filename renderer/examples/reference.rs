@@ -6,7 +6,7 @@
 //! ```
 //!
 //! ERROR is the standard error at every point and colour as a fraction of the scene's mean; direct light alone is
-//! brought down to a tenth of that fraction of its own mean.
+//! brought down to 0.4 of that fraction of its own mean.
 
 #![allow(clippy::print_stdout, clippy::print_stderr)]
 
@@ -47,7 +47,7 @@ fn run(path: &Path, points: &str, error: &str) -> Result<(), Box<dyn Error>> {
         Err(_) => read_points(Path::new(points), &scene)?,
     };
     let total_error: f64 = error.parse()?;
-    let options = ReferenceOptions { total_error, direct_error: total_error / 10.0, seed: SEED };
+    let options = ReferenceOptions { total_error, direct_error: 0.4 * total_error, seed: SEED };
     let result = reference(&scene, &Bvh::of_scene(&scene), &points, &options);
     let name = path.file_stem().unwrap_or_default().to_string_lossy();
     print(&name, &points, &result, &options);
