@@ -19,6 +19,10 @@ use crate::form_factor::point_form_factor;
 /// above zero; larger would only drop thin fragments.
 pub const PLANE_TOLERANCE: f64 = 1e-13;
 
+/// Form factor of a fragment that is no more than the rounding between two blockers that share an edge. Dark rooms
+/// are exactly dark for it; nothing that could be seen through such a slit is lost.
+pub const SLIVER: f64 = 1e-14;
+
 /// What a blocker hides from a point: a convex cone of directions.
 #[derive(Clone, Debug, Default)]
 pub struct BlockerCone {
@@ -165,9 +169,15 @@ impl Fragments {
         first..self.points.len()
     }
 
-    /// Whether nothing of the source is seen.
+    /// Whether nothing of the source is left.
     pub fn is_empty(&self) -> bool {
         self.ranges.is_empty()
+    }
+
+    /// Drops fragments that are mere rounding; after the last blocker.
+    pub fn drop_slivers(&mut self, normal: DVec3) {
+        let points = &self.points;
+        self.ranges.retain(|range| point_form_factor(&points[range.clone()], normal) > SLIVER);
     }
 
     /// The fragments: convex cones, corners relative to the point.

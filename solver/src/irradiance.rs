@@ -10,7 +10,7 @@
 use glam::DVec3;
 use scene::{Rgb, Scene, luminance};
 
-use crate::backprojection::{BlockerCone, Fragments, Viewpoint};
+use crate::backprojection::{BlockerCone, Fragments, SLIVER, Viewpoint};
 use crate::blocker::Blocker;
 use crate::clip::{Position, clip_convex, locate};
 use crate::form_factor::point_form_factor;
@@ -20,7 +20,7 @@ use crate::{LinkSource, NodeId};
 
 /// How much light a reflector's linear elements may misplace at a point before finer ones are opened, as a fraction
 /// of the scene's mean irradiance. Per source and point; smaller is slower in proportion to its square root.
-const SOURCE_BUDGET: f64 = 2e-4;
+const SOURCE_BUDGET: f64 = 1e-3;
 
 /// How other polygons touch a point of a polygon: how many values irradiance has there.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -137,7 +137,7 @@ impl<'a> Gather<'a> {
     /// Irradiance at a position in the plane of a polygon, W·m⁻²; `inward` is the direction in the plane from whose
     /// side the limit is taken where other polygons touch the position. Finds the leaf by itself: for single points.
     pub fn irradiance_at(&self, polygon: u32, position: DVec3, inward: DVec3) -> Rgb {
-        match self.leaf_under(polygon, position, inward) {
+        match self.leaf_under(polygon, position, DVec3::ZERO, inward) {
             Some(leaf) => self.over(leaf).irradiance(position, inward),
             None => Rgb::ZERO,
         }
@@ -163,8 +163,9 @@ impl<'a> Gather<'a> {
         Source { polygon, blockers }
     }
 
-    /// The leaf of a polygon that contains a position; of several the one that lies farthest along `towards`.
-    fn leaf_under(&self, polygon: u32, position: DVec3, towards: DVec3) -> Option<NodeId> {
+    /// The leaf of a polygon that contains a position; of several one on the side of `above`, and of these the one that
+    /// lies farthest along `towards`.
+    fn leaf_under(&self, polygon: u32, position: DVec3, above: DVec3, towards: DVec3) -> Option<NodeId> {
         let elements = &self.solution.elements;
         let normal = self.geometry.plane(polygon).normal;
         // Points given in a file carry a rounding of their own: the nearest patch is good enough.
@@ -173,7 +174,7 @@ impl<'a> Gather<'a> {
         };
         let mut tolerance = self.geometry.contact_tolerance;
         while tolerance < self.geometry.size {
-            let mut best: Option<(f64, NodeId)> = None;
+            let mut best: Option<((bool, f64), NodeId)> = None;
             let mut open: Vec<NodeId> = self.solution.patch_roots(polygon).collect();
             while let Some(node) = open.pop() {
                 if !contains(node, tolerance) {
@@ -183,9 +184,10 @@ impl<'a> Gather<'a> {
                     open.extend(elements.children(node).rev());
                     continue;
                 }
-                let side = (elements.nodes[node as usize].centre - position).normalize_or_zero().dot(towards);
-                if best.is_none_or(|(most, _)| side > most + 1e-9) {
-                    best = Some((side, node));
+                let middle = (elements.nodes[node as usize].centre - position).normalize_or_zero();
+                let (on_side, along) = (middle.dot(above) > 1e-9, middle.dot(towards));
+                if best.is_none_or(|((side, most), _)| (on_side && !side) || (on_side == side && along > most + 1e-9)) {
+                    best = Some(((on_side, along), node));
                 }
             }
             if let Some((_, leaf)) = best {
@@ -248,6 +250,7 @@ impl LeafGather<'_> {
                     }
                 }
             }
+            fragments.drop_slivers(up);
             total += self.light(source.polygon, &fragments, touches, &from);
         }
         total
@@ -267,7 +270,7 @@ impl LeafGather<'_> {
         let mut reflected = Rgb::ZERO;
         if touches {
             // In the limit the whole cone meets the source at the point itself.
-            if let Some(leaf) = gather.leaf_under(source, from.position, from.inward) {
+            if let Some(leaf) = gather.leaf_under(source, from.position, from.up, from.inward) {
                 let at = solution.reflected_irradiance(leaf, from.position);
                 reflected = at * fragments.form_factor(from.up);
             }
@@ -297,6 +300,9 @@ impl LeafGather<'_> {
         let solution = self.gather.solution;
         let elements = &solution.elements;
         let form_factor = point_form_factor(fragment, from.up);
+        if form_factor <= SLIVER {
+            return; // The neighbour's, but for a rounding: there may be a wall on the border between the two.
+        }
         let light = &solution.light[node as usize];
         if elements.is_leaf(node) || light.deviation * form_factor <= budget {
             *sum += form_factor * self.weighted_light(light, node, fragment, from);

@@ -7,6 +7,7 @@ mod backprojection;
 mod blocker;
 mod clip;
 mod contour;
+mod cut;
 mod element;
 mod form_factor;
 mod geometry;
@@ -15,14 +16,21 @@ mod linear_fit;
 mod oracle;
 mod quadrature;
 mod reconstruct;
+mod refine;
 mod solution;
+mod solve;
+#[cfg(test)]
+mod testing;
 mod transport;
 mod validate;
+mod visibility;
 
+pub use cut::{contact_lines, cut_polygon};
 pub use element::{Elements, Node, NodeId, NodeKind, Patch};
 pub use form_factor::{exchange, form_factor, form_factor_at, point_form_factor};
 pub use irradiance::{Contact, Gather, LeafGather};
 pub use solution::{
     BlockerLists, Convergence, Cut, ElementLight, Interaction, Link, LinkSource, Solution, SolveOptions,
 };
+pub use solve::solve;
 pub use validate::Validation;

@@ -76,8 +76,7 @@ impl Network {
                     .collect()
             })
             .collect();
-        let mut network =
-            Self { geometry, elements, interner: BlockerInterner::default(), links: Vec::new() };
+        let mut network = Self { geometry, elements, interner: BlockerInterner::default(), links: Vec::new() };
         let mut open = Vec::new();
         for (a, b, list) in found.into_iter().flatten() {
             let blockers = network.interner.intern(&list);
@@ -253,6 +252,7 @@ impl Network {
                 fragments.subtract(&cone);
             }
         }
+        fragments.drop_slivers(up);
         fragments.form_factor(up)
     }
 
@@ -331,9 +331,8 @@ fn patch_pairs(
     b: u32,
 ) -> Vec<(NodeId, NodeId, Vec<u32>)> {
     let planes = [a, b].map(|polygon| geometry.plane(polygon));
-    let facing = |front: &[DVec3], back: &[DVec3]| {
-        facing_parts(front, &planes[0], back, &planes[1], geometry.contact_tolerance)
-    };
+    let facing =
+        |front: &[DVec3], back: &[DVec3]| facing_parts(front, &planes[0], back, &planes[1], geometry.contact_tolerance);
     let Some(parts) = facing(geometry.outline(a), geometry.outline(b)) else { return Vec::new() };
     let others: Vec<u32> =
         (0..geometry.outlines.len() as u32).filter(|&polygon| polygon != a && polygon != b).collect();

@@ -64,7 +64,7 @@ impl BlockerLists {
 
     /// Memory that the lists take, bytes.
     pub fn bytes(&self) -> usize {
-        std::mem::size_of_val(self.lists.as_slice()) + std::mem::size_of_val(self.polygons.as_slice())
+        size_of_val(self.lists.as_slice()) + size_of_val(self.polygons.as_slice())
     }
 }
 

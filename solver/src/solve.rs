@@ -27,8 +27,7 @@ pub fn solve(scene: &Scene, options: &SolveOptions, progress: &(dyn Fn(f64) + Sy
     for pieces in &pieces {
         first_patch.push(first_patch.last().unwrap_or(&0) + pieces.len() as u32);
     }
-    let mut network =
-        Network::of_patches(scene, Elements::new(&pieces), &first_patch, options.bounces == Some(0));
+    let mut network = Network::of_patches(scene, Elements::new(&pieces), &first_patch, options.bounces == Some(0));
     progress(0.1);
     let (mut links, mut first_link) = network.sorted_links();
     let mut carried = transport(scene, &network.elements, &links, &first_link, options.bounces);
@@ -89,4 +88,157 @@ fn mean_irradiance(elements: &Elements, transport: &Transport) -> Rgb {
     let total: f64 = elements.leaves().map(area).sum();
     let sum: Rgb = elements.leaves().map(|leaf| transport.irradiance[leaf as usize].irradiance * area(leaf)).sum();
     if total > 0.0 { sum / total } else { Rgb::ZERO }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec3;
+
+    use super::*;
+    use crate::testing::Builder;
+
+    fn solved(scene: &Scene, link_error: f64, bounces: Option<u32>) -> Solution {
+        solve(scene, &SolveOptions { link_error: Some(link_error), bounces }, &|_| ())
+    }
+
+    fn furnished(reflectance: f64, radiance: f64) -> Scene {
+        Builder::default()
+            .material(reflectance, radiance)
+            .cuboid([0.0, 0.0, 0.0], [4.0, 3.0, 2.5], true)
+            .sides([0.7, 0.5, 0.0].into(), [1.5, 1.4, 0.8].into(), false, [true, true, true, true, false, true])
+            .sides([2.2, 1.3, 0.9].into(), [3.5, 2.2, 1.0].into(), false, [true; 6])
+            .build()
+    }
+
+    #[test]
+    fn nothing_and_darkness() {
+        let empty = solve(&Scene::default(), &SolveOptions::default(), &|_| ());
+        assert_eq!(empty.elements.nodes.len(), 1);
+        let dark = furnished(0.5, 0.0);
+        let solution = solve(&dark, &SolveOptions::default(), &|_| ());
+        assert_eq!(solution.mean_irradiance, Rgb::ZERO);
+        assert!(solution.convergence.reached);
+        assert_eq!(Gather::new(&dark, &solution).irradiance_at(4, DVec3::new(2.0, 2.0, 0.0), DVec3::ZERO), Rgb::ZERO);
+    }
+
+    /// Closed enclosure of uniform exitance M and reflectance ρ: B = M/(1−ρ) everywhere.
+    #[test]
+    fn a_furnace_is_uniform() {
+        for (reflectance, radiance) in [(0.5, 0.01), (0.9, 0.002)] {
+            let room =
+                Builder::default().material(reflectance, radiance).cuboid([0.0; 3], [2.0, 3.0, 1.0], true).build();
+            let solution = solved(&room, 1e-4, None);
+            let expected = std::f64::consts::PI * radiance / (1.0 - reflectance);
+            for leaf in solution.elements.leaves() {
+                let exitance = std::f64::consts::PI * radiance;
+                for light in [&solution.irradiance[leaf as usize], &solution.light[leaf as usize]] {
+                    let radiosity = reflectance * light.irradiance + exitance;
+                    assert!((radiosity / expected - 1.0).abs().max_element() < 1e-3, "{radiosity} {expected}");
+                }
+            }
+            let laws = solution.validate(&room);
+            assert!(laws.closure < 1e-6 && laws.reciprocity < 1e-9 && laws.energy < 1e-6, "{laws:?}");
+            assert_eq!((laws.doubled_links, laws.bad_numbers, laws.open_patches), (0, 0, 0));
+        }
+    }
+
+    #[test]
+    fn a_furnished_furnace_obeys_the_laws() {
+        let room = furnished(0.6, 1.0);
+        let solution = solved(&room, 0.02, None);
+        let laws = solution.validate(&room);
+        eprintln!("{laws:?}");
+        assert!(laws.closure < 1e-3 && laws.energy < 1e-3, "{laws:?}");
+        assert!(laws.reciprocity < 2e-3, "{laws:?}");
+        assert_eq!((laws.doubled_links, laws.bad_numbers), (0, 0));
+        let gather = Gather::new(&room, &solution);
+        // Exact visibility: what a point sees adds up to the hemisphere, under the table and beside the box.
+        for (x, y) in [(2.8, 1.7), (0.65, 0.9), (1.51, 1.0), (3.9, 0.1)] {
+            let irradiance = gather.irradiance_at(4, DVec3::new(x, y, 0.0), DVec3::ZERO);
+            assert!((irradiance.x / (std::f64::consts::PI / 0.4) - 1.0).abs() < 1e-3, "{irradiance}");
+        }
+    }
+
+    /// A dark box of walls without thickness, standing on the floor of a lit room and sharing its polygon: nothing at
+    /// all gets in, and outside nothing is lost.
+    #[test]
+    fn no_light_leaks_under_a_wall() {
+        let (low, high) = (DVec3::new(1.0, 1.0, 0.0), DVec3::new(2.0, 2.2, 1.0));
+        let walls = [true, true, true, true, false, true];
+        let room = Builder::default()
+            .material(0.7, 0.5)
+            .cuboid([0.0, 0.0, 0.0], [4.0, 3.0, 2.5], true)
+            .material(0.5, 0.0)
+            .sides(low, high, false, walls)
+            .sides(low, high, true, walls)
+            .build();
+        // The floor emits inside the box, too: it must not for this test.
+        let mut room = room;
+        room.materials.push(scene::Material { radiance: Rgb::ZERO, ..room.materials[0].clone() });
+        room.polygons[4].material = 2;
+        let solution = solved(&room, 0.05, None);
+        let gather = Gather::new(&room, &solution);
+        let inside = |x: f64, y: f64| (1.0..=2.0).contains(&x) && (1.0..=2.2).contains(&y);
+        let centre = DVec3::new(1.5, 1.6, 0.0);
+        for i in 0..=40 {
+            for j in 0..=30 {
+                let point = DVec3::new(f64::from(i) * 0.1, f64::from(j) * 0.1, 0.0);
+                if inside(point.x, point.y) {
+                    // On the border too: the limit from inside.
+                    assert_eq!(gather.irradiance_at(4, point, centre - point), Rgb::ZERO, "{point}");
+                }
+            }
+        }
+        for point in [DVec3::new(0.999_999, 1.5, 0.0), DVec3::new(1.5, 2.200_001, 0.0)] {
+            assert!(gather.irradiance_at(4, point, DVec3::ZERO).x > 0.1);
+        }
+        for leaf in solution.elements.leaves() {
+            let polygon = solution.elements.polygon_of(leaf).expect("a leaf is a surface");
+            let middle = solution.elements.nodes[leaf as usize].centre;
+            if polygon >= 11 || (polygon == 4 && inside(middle.x, middle.y)) {
+                assert_eq!(solution.irradiance[leaf as usize].irradiance, Rgb::ZERO, "polygon {polygon} {middle}");
+            }
+        }
+    }
+
+    #[test]
+    fn bounces_add_up_to_convergence() {
+        let room = furnished(0.5, 0.3);
+        let at = |bounces: Option<u32>| {
+            let solution = solved(&room, 0.05, bounces);
+            Gather::new(&room, &solution).irradiance_at(4, DVec3::new(3.0, 0.5, 0.0), DVec3::ZERO).x
+        };
+        let exitance = 0.3 * std::f64::consts::PI;
+        // With M everywhere every bounce multiplies by ρ: 1, 1 + ρ, 1 + ρ + ρ², …
+        for (bounces, factor) in [(Some(0), 1.0), (Some(1), 1.5), (Some(2), 1.75), (None, 2.0)] {
+            assert!((at(bounces) / (exitance * factor) - 1.0).abs() < 2e-3, "{bounces:?}: {}", at(bounces) / exitance);
+        }
+    }
+
+    #[test]
+    fn the_same_solution_at_any_thread_count() {
+        let room = furnished(0.5, 0.3);
+        let on = |threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads can be had");
+            pool.install(|| solved(&room, 0.05, None))
+        };
+        assert_eq!(on(1), on(3));
+    }
+
+    #[test]
+    fn the_error_falls_with_the_link_error() {
+        let room = Builder::default()
+            .material(0.7, 0.0)
+            .sides([0.0; 3].into(), [4.0, 3.0, 2.5].into(), true, [true, true, true, true, true, false])
+            .material(0.2, 4.0)
+            .sides([0.0; 3].into(), [4.0, 3.0, 2.5].into(), true, [false, false, false, false, false, true])
+            .build();
+        let at = |link_error: f64| {
+            let solution = solved(&room, link_error, None);
+            Gather::new(&room, &solution).irradiance_at(4, DVec3::new(0.3, 0.2, 0.0), DVec3::ZERO).x
+        };
+        let best = at(0.005);
+        let errors: Vec<f64> = [1.0, 0.1].map(|link_error| (at(link_error) / best - 1.0).abs()).to_vec();
+        assert!(errors[1] < 0.5 * errors[0] + 1e-4 && errors[1] < 3e-3, "{errors:?}");
+    }
 }

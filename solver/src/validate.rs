@@ -2,9 +2,13 @@
 
 use std::collections::HashMap;
 
-use scene::{Rgb, Scene};
+use scene::{Bvh, Ray, Rgb, Scene};
 
 use crate::{LinkSource, NodeId, Solution};
+
+/// Rays from each of a dozen points of a patch that decide whether it lies in a closed room: enough to see an opening
+/// of a few percent of the hemisphere.
+const CLOSURE_RAYS: u32 = 64;
 
 /// What a solution was measured to violate. All zero for a perfect one.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -12,11 +16,13 @@ pub struct Validation {
     /// Largest |A_i F_ij − A_j F_ji| over pairs of patches, visibility included, as a fraction of the smaller of the
     /// two areas.
     pub reciprocity: f64,
-    /// Largest |1 − Σ F| over the patches, area-weighted over each; in a closed room the form factors from a patch
-    /// to everything that it sees add up to 1. Patches that see nothing (faces in contact) are left out.
+    /// Largest |1 − Σ F| over the closed patches, area-weighted over each: the form factors from a patch to all fronts
+    /// that it sees add up to 1 where it sees nothing else.
     pub closure: f64,
-    /// The same, weighted by area over all patches.
+    /// The same, weighted by area over all closed patches.
     pub mean_closure: f64,
+    /// Patches that closure says nothing of: from them some ray leaves the scene or meets a back.
+    pub open_patches: u32,
     /// |emitted − absorbed| ÷ emitted power, largest over the colours; 0 only in a closed room without bounce limit.
     pub energy: f64,
     /// Pairs of a leaf and a source point that are linked more than once: a node linked both itself and through an
@@ -43,7 +49,9 @@ impl Solution {
                 *exchanged.entry((to, from)).or_default() += transfer * elements.nodes[link.receiver as usize].area;
             }
         }
-        result.bad_numbers += self.irradiance.iter().filter(|e| !e.irradiance.is_finite() || e.irradiance.min_element() < 0.0).count() as u32;
+        result.bad_numbers +=
+            self.irradiance.iter().filter(|e| !e.irradiance.is_finite() || e.irradiance.min_element() < 0.0).count()
+                as u32;
         let area = |patch: u32| elements.nodes[elements.patches[patch as usize].root as usize].area;
         let mut sums = vec![0.0; elements.patches.len()];
         let mut ordered: Vec<_> = exchanged.iter().collect();
@@ -54,18 +62,39 @@ impl Solution {
             sums[to as usize] += there;
         }
         let (mut weighted, mut total) = (0.0, 0.0);
+        let bvh = Bvh::of_scene(scene);
         for (patch, &sum) in (0..).zip(&sums) {
-            if sum > 0.0 {
-                let defect = (1.0 - sum / area(patch)).abs();
-                result.closure = result.closure.max(defect);
-                weighted += defect * area(patch);
-                total += area(patch);
+            if !self.is_closed(&bvh, patch) {
+                result.open_patches += 1;
+                continue;
             }
+            let defect = (1.0 - sum / area(patch)).abs();
+            result.closure = result.closure.max(defect);
+            weighted += defect * area(patch);
+            total += area(patch);
         }
         result.mean_closure = if total > 0.0 { weighted / total } else { 0.0 };
         result.energy = self.energy_defect(scene);
         result.doubled_links = self.doubled_links();
         result
+    }
+
+    /// Whether rays from all over a patch meet nothing but fronts.
+    fn is_closed(&self, bvh: &Bvh, patch: u32) -> bool {
+        let (frame, root) = (&self.elements.patches[patch as usize], self.elements.patches[patch as usize].root);
+        let (up, outline) = (frame.u.cross(frame.v), self.elements.outline(root));
+        let centre = self.elements.nodes[root as usize].centre;
+        outline.iter().flat_map(|&corner| [0.2, 0.6, 0.97].map(|reach| centre.lerp(corner, reach))).all(|origin| {
+            (0..CLOSURE_RAYS).all(|i| {
+                // A spiral over the hemisphere, even in the cosine measure.
+                let radius = ((f64::from(i) + 0.5) / f64::from(CLOSURE_RAYS)).sqrt();
+                let angle = f64::from(i) * 2.399_963_229_728_653; // the golden angle
+                let across = frame.u * (radius * angle.cos()) + frame.v * (radius * angle.sin());
+                let direction = across + up * (1.0 - radius * radius).sqrt();
+                let hit = bvh.closest_hit_among(&Ray { origin, direction }, |polygon| polygon != frame.polygon);
+                hit.is_some_and(|hit| hit.normal.dot(direction) < 0.0)
+            })
+        })
     }
 
     fn energy_defect(&self, scene: &Scene) -> f64 {
