@@ -34,6 +34,20 @@ struct Seen {
     weight: f64,
 }
 
+impl SeenEmitters {
+    /// An emitter chosen by weight, and the place of `u` within the emitter's share, which is uniform in 0..1 again.
+    fn choose(&self, u: f64) -> Option<(&Seen, f64)> {
+        let mut rest = u * self.total;
+        for emitter in &self.seen {
+            if rest < emitter.weight {
+                return Some((emitter, rest / emitter.weight));
+            }
+            rest -= emitter.weight;
+        }
+        None
+    }
+}
+
 impl Emitters {
     pub fn new(surfaces: &Surfaces<'_>) -> Self {
         let scene = surfaces.scene;
@@ -48,7 +62,7 @@ impl Emitters {
     }
 
     /// Lists the emitters whose front a receiver may see, with the weights by which one is chosen: radiance × solid
-    /// angle, which keeps every sample below π × the total. This is linear in the number of emitters.
+    /// angle, so that no sample is larger than the sum of the weights. This is linear in the number of emitters.
     pub fn seen_from(&self, surfaces: &Surfaces<'_>, receiver: &Receiver, into: &mut SeenEmitters) {
         into.seen.clear();
         into.total = 0.0;
@@ -70,19 +84,8 @@ impl Emitters {
     /// One sample of the direct irradiance at a receiver, W·m⁻², from two uniform numbers in 0..1: an emitter chosen
     /// by weight, a direction into it chosen evenly, and whether anything stands between.
     pub fn irradiance(&self, surfaces: &Surfaces<'_>, receiver: &Receiver, seen: &SeenEmitters, uv: [f64; 2]) -> Rgb {
-        // The first number chooses the emitter; its place in that emitter's share is uniform again.
-        let mut place = uv[0] * seen.total;
-        let mut chosen = seen.seen.iter();
-        let Some(emitter) = chosen.find(|emitter| {
-            let here = place < emitter.weight;
-            if !here {
-                place -= emitter.weight;
-            }
-            here
-        }) else {
-            return Rgb::ZERO;
-        };
-        let Some(direction) = emitter.shape.sample(place / emitter.weight, uv[1]) else { return Rgb::ZERO };
+        let Some((emitter, place)) = seen.choose(uv[0]) else { return Rgb::ZERO };
+        let Some(direction) = emitter.shape.sample(place, uv[1]) else { return Rgb::ZERO };
         let triangle = &self.triangles[emitter.triangle as usize];
         let plane = surfaces.plane(triangle.polygon);
         let cosine = receiver.normal.dot(direction);

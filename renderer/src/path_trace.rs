@@ -262,6 +262,25 @@ mod tests {
         assert_eq!(trace(&scene, &behind, &options(256, None)), vec![Estimate::default(); 2]);
     }
 
+    /// Emitters of different colours, sizes and distances, one of them partly behind another: what one gives must not
+    /// depend on how often the other is chosen.
+    #[test]
+    fn emitters_add_up() {
+        let corner = |width: f64, height: f64| width / width.hypot(1.0) * (height / width.hypot(1.0)).atan();
+        let factor = |a: f64, b: f64| (corner(a, b) + corner(b, a)) / TAU;
+        let coloured = |radiance| scene::Material { radiance, ..black() };
+        let near = (ceiling([0., 0.1], [0., 0.1], 0.2), coloured(Rgb::X * 100.0));
+        let far = (ceiling([-4., 0.], [0., 8.], 2.0), coloured(Rgb::Z * 0.5));
+        let behind_near = (ceiling([0., 2.], [0., 2.], 2.0), coloured(Rgb::Y));
+        let scene = scene_of(&[near, far, behind_near]);
+        let estimate = trace(&scene, &[(DVec3::ZERO, DVec3::Z)], &options(1 << 16, None))[0];
+        let truth =
+            PI * Rgb::new(100.0 * factor(0.5, 0.5), factor(1.0, 1.0) - factor(0.5, 0.5), 0.5 * factor(2.0, 4.0));
+        let score = (estimate.mean - truth) / estimate.standard_error();
+        assert!(score.abs().max_element() < 4.5, "{} for {truth}: {score}", estimate.mean);
+        assert!((estimate.standard_error() / truth).max_element() < 0.02);
+    }
+
     /// Half of an emitter behind the horizon, and all points of the receiver down to the contact.
     #[test]
     fn at_a_contact_the_limit_is_half_the_exitance() {
