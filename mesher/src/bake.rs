@@ -188,3 +188,85 @@ fn stored_triangles(leaves: &[Leaf], mesh: &Mesh, samples: &[[u32; 6]]) -> (Vec<
         .collect();
     (vertices, triangles)
 }
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+
+    use glam::DVec3;
+    use scene::Rgb;
+    use solver::{SolveOptions, solve};
+
+    use super::*;
+    use crate::testing::scene_of;
+
+    /// A rectangle across z around a middle, facing up or down.
+    fn rectangle(middle: [f64; 3], half: f64, up: bool) -> Vec<DVec3> {
+        let mut corners = [(-1., -1.), (1., -1.), (1., 1.), (-1., 1.)]
+            .map(|(x, y)| DVec3::from(middle) + DVec3::new(x, y, 0.0) * half)
+            .to_vec();
+        if !up {
+            corners.reverse();
+        }
+        corners
+    }
+
+    /// A floor under a lamp, half hidden from it by a plate.
+    fn floor_lamp_and_plate() -> Scene {
+        let outlines = [
+            rectangle([0.0, 0.0, 0.0], 2.0, true),
+            rectangle([0.0, 0.0, 2.0], 0.2, false),
+            rectangle([0.31, 0.17, 1.0], 0.4, true),
+        ];
+        let mut scene = scene_of(&outlines);
+        let lamp = scene::Material { name: "lamp".into(), radiance: Rgb::splat(100.0), ..scene.materials[0].clone() };
+        scene.materials.push(lamp);
+        scene.polygons[1].material = 1;
+        scene
+    }
+
+    fn baked(scene: &Scene, options: &BakeOptions) -> (Baked, BakeStatistics) {
+        let direct = SolveOptions { link_error: None, bounces: Some(0) };
+        bake(scene, &solve(scene, &direct, &|_| ()), options, &|fraction| assert!((0.0..=1.0).contains(&fraction)))
+    }
+
+    #[test]
+    fn an_empty_scene_bakes_to_nothing() {
+        let (baked, statistics) = baked(&Scene::default(), &BakeOptions::default());
+        assert_eq!((baked, statistics), (Baked::default(), BakeStatistics::default()));
+    }
+
+    #[test]
+    fn triangles_fill_every_polygon_and_all_is_in_range() {
+        let scene = floor_lamp_and_plate();
+        let (baked, statistics) = baked(&scene, &BakeOptions { discontinuities: 10, min_weight: 1.0 });
+        baked.validate().unwrap();
+        assert_eq!(statistics.mesh, MeshStatistics::default());
+        assert_eq!(statistics.discontinuities_kept, baked.lines.len());
+        assert_eq!(baked.error.points, 3 * baked.triangles.len() as u64);
+        for polygon in scene.polygon_ids() {
+            let of_polygon = (0..baked.triangles.len() as u32)
+                .filter(|&triangle| baked.triangles[triangle as usize].polygon == polygon);
+            let area: f64 = of_polygon.map(|triangle| scene::area_vector(&baked.corners(triangle)).length()).sum();
+            assert!((area / scene.area(polygon) - 1.0).abs() < 1e-6, "the rounding to f32");
+        }
+    }
+
+    #[test]
+    fn following_discontinuities_lowers_the_error() {
+        let scene = floor_lamp_and_plate();
+        let error = |discontinuities| baked(&scene, &BakeOptions { discontinuities, min_weight: 1.0 }).0.error.rms;
+        let (none, all) = (error(0), error(20));
+        assert!(all < 0.5 * none, "{all} of {none}");
+    }
+
+    #[test]
+    fn any_number_of_threads_bakes_the_same() {
+        let scene = floor_lamp_and_plate();
+        let run = |threads: usize| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| baked(&scene, &BakeOptions::default()))
+        };
+        assert!(run(1) == run(3));
+    }
+}

@@ -185,6 +185,9 @@ mod tests {
     use scene::area_vector;
 
     use super::*;
+    use solver::Cut;
+
+    use crate::edge_table::Constraint;
     use crate::testing::{Room, room, scene_of};
     use crate::{Leaf, LeafSegment, edge_table};
 
@@ -282,6 +285,64 @@ mod tests {
         let mesh = square_with(segments);
         assert_eq!(mesh.statistics, MeshStatistics::default());
         assert_eq!((mesh.triangles.len(), lines_of(&mesh).len()), (44, 20));
+    }
+
+    #[test]
+    fn what_the_triangulation_cannot_do_becomes_a_star() {
+        let scene = scene_of(&[square()]);
+        let leaf = Leaf { outline: square(), segments: vec![segment(0, 0.2, 0.2, 0.8, 0.7)], ..Leaf::default() };
+        let mut table = edge_table(&scene, &[], &[leaf]);
+        // An end of the segment is moved onto a corner, which the table would never do.
+        let end = table.leaves[0].interior.start as usize;
+        table.vertices[end] = table.vertices[0];
+        let mesh = leaf_meshes(&table);
+        let statistics = MeshStatistics { dropped_constraints: 1, star_leaves: 1, collapsed_leaves: 0 };
+        assert_eq!((mesh.triangles.len(), mesh.statistics), (4, statistics));
+        assert!(mesh.triangles.iter().all(|triangle| (area(&mesh, triangle) - 0.25).abs() < 1e-12));
+        assert!(mesh.triangles.iter().all(|triangle| triangle.edges[0] == EdgeKind::Leaf));
+    }
+
+    #[test]
+    fn a_refused_constraint_is_counted() {
+        let scene = scene_of(&[square()]);
+        let leaf = Leaf { outline: square(), segments: vec![segment(0, 0.2, 0.2, 0.8, 0.7)], ..Leaf::default() };
+        let mut table = edge_table(&scene, &[], &[leaf]);
+        table.leaves[0].constraints.push(Constraint { ends: [1, 3], line: 1 });
+        let mesh = leaf_meshes(&table);
+        assert_eq!(mesh.statistics, MeshStatistics { dropped_constraints: 1, ..MeshStatistics::default() });
+        assert_eq!(lines_of(&mesh), [0]);
+    }
+
+    #[test]
+    fn cuts_put_vertices_at_their_ends_and_mark_the_border() {
+        let scene = scene_of(&[square()]);
+        let half = |y: f64| Leaf {
+            outline: vec![point(0.0, y), point(1.0, y), point(1.0, y + 0.5), point(0.0, y + 0.5)],
+            ..Leaf::default()
+        };
+        let cut = Cut { ends: [point(0.2, 0.5), point(0.7, 0.5)], other: 1 };
+        let mesh = leaf_meshes(&edge_table(&scene, &[vec![cut]], &[half(0.0), half(0.5)]));
+        let cuts: Vec<_> = mesh
+            .triangles
+            .iter()
+            .flat_map(|t| t.edges.map(|edge| (t.leaf, edge)))
+            .filter(|e| e.1 == EdgeKind::Cut)
+            .collect();
+        assert_eq!((mesh.vertices.len(), cuts), (8, vec![(0, EdgeKind::Cut), (1, EdgeKind::Cut)]));
+    }
+
+    #[test]
+    fn a_line_that_one_leaf_drops_leaves_its_vertex_with_both() {
+        let scene = scene_of(&[square()]);
+        let half = |y: f64, segments| Leaf {
+            outline: vec![point(0.0, y), point(1.0, y), point(1.0, y + 0.5), point(0.0, y + 0.5)],
+            segments,
+            ..Leaf::default()
+        };
+        let leaves = [half(0.0, vec![segment(0, 0.4, 0.0, 0.4, 0.5)]), half(0.5, vec![])];
+        let mesh = leaf_meshes(&edge_table(&scene, &[], &leaves));
+        // Two triangles on each side of the line, and three in the other leaf.
+        assert_eq!((mesh.vertices.len(), mesh.triangles.len()), (8, 7));
     }
 
     #[test]
