@@ -43,8 +43,9 @@ pub struct Discontinuity {
 /// The discontinuities of weight at least `min_weight` (W·m⁻²) that the interactions of a receiver cause on it.
 ///
 /// The weight is that of a whole event on the whole receiver, so that all its leaves agree on which lines there are.
-/// `half_edges` must be the scene's own. Interactions that name polygons which do not exist are passed over. The order
-/// is that of the interactions, within one of them by event, within an event along the line.
+/// `half_edges` must be the scene's own. What an interaction does not list as a blocker stops no light of its source.
+/// Interactions that name polygons which do not exist are passed over. The order is that of the interactions, within
+/// one of them by event, within an event along the line.
 pub fn discontinuities(
     scene: &Scene,
     half_edges: &HalfEdges,
@@ -197,7 +198,8 @@ impl Search<'_> {
     }
 
     /// The rays of a pencil that could reach the receiver, if the line where they meet it divides it and is strong
-    /// enough. Along a line the ratio of distances is monotone, so that its ends bound the weight.
+    /// enough. The ratio of distances is that of heights over the receiver, h_sb / h_br, of which one is constant and the
+    /// other linear in the ray's parameter: it is largest at one of the ends, and so is the weight (but for the floor).
     fn landing(&self, case: &Case, pencil: &Pencil) -> Option<Interval> {
         let rays = pencil.landing(&case.plane, &self.receiver)?;
         let ends = rays.map(|u| pencil.point(u, &self.receiver.plane));

@@ -284,6 +284,17 @@ fn a_plate_that_covers_all_leaves_its_own_lines_only() {
 }
 
 #[test]
+fn a_plate_that_comes_from_behind_the_light_hides_nothing_there() {
+    let mut outlines = blocker_plane();
+    outlines.push(vec![v(0.0, -2.0, 1.5), v(1.5, -2.0, 0.9), v(1.5, 2.0, 0.9), v(0.0, 2.0, 1.5)]);
+    let found: Vec<Discontinuity> = search(&outlines).into_iter().filter(|line| line.blocker == 2).collect();
+    let plain = search(&blocker_plane());
+    for kind in KINDS {
+        assert_same(&of_kind(&found, kind), &of_kind(&plain, kind));
+    }
+}
+
+#[test]
 fn swaths_to_infinity_end_at_the_receivers_border() {
     // A mast higher than the light: its upright edges' lines go from the foot to the border.
     let light = rectangle((1.0, -0.1), (1.2, 0.1), 1.0, true);
@@ -295,6 +306,35 @@ fn swaths_to_infinity_end_at_the_receivers_border() {
         .collect();
     assert_same(&of_kind(&found, LineKind::VertexEdge), &expected);
     assert!(of_kind(&found, LineKind::EdgeVertex).is_empty());
+}
+
+#[test]
+fn a_line_along_the_border_divides_nothing() {
+    // The border, the light's corners and the post's edge are in one plane.
+    let light = rectangle((2.0, 3.8), (2.5, 4.0), 3.0, true);
+    let post = vec![v(0.0, 4.0, 0.0), v(0.0, 3.9, 0.0), v(0.0, 3.9, 1.0), v(0.0, 4.0, 1.0)];
+    let found = search(&[floor(), light, post]);
+    assert!(!found.is_empty());
+    assert!(found.iter().all(|line| line.ends.iter().any(|end| end.y < 3.999)), "{found:?}");
+}
+
+#[test]
+fn an_edge_counts_when_only_one_of_its_faces_is_listed() {
+    let ridge = [v(0.0, -0.3, 0.6), v(0.0, 0.3, 0.6)];
+    let slope = |x: f64| vec![ridge[0], ridge[1], v(x, 0.3, 0.4), v(x, -0.3, 0.4)];
+    let mut right = slope(0.3);
+    right.reverse();
+    let scene = welded(&[floor(), rectangle((1.0, -0.2), (1.2, 0.2), 0.8, true), slope(-0.3), right]);
+    let half_edges = HalfEdges::new(&scene);
+    let on_ridge = |blockers: Vec<u32>| {
+        let interactions = [Interaction { source: 1, radiosity: 1.0, blockers }];
+        let found = discontinuities(&scene, &half_edges, 0, &interactions, 0.0);
+        let grazes = |line: &&Discontinuity| line.rays.iter().all(|ray| ray.blocker.x == 0.0 && ray.blocker.z == 0.6);
+        let is_swath = |line: &&Discontinuity| line.kind == LineKind::VertexEdge && grazes(line);
+        found.iter().filter(is_swath).count()
+    };
+    // Seen from the light one slope shows its front and the other its back.
+    assert_eq!([on_ridge(vec![2, 3]), on_ridge(vec![2]), on_ridge(vec![3])], [4, 4, 4]);
 }
 
 #[test]
@@ -369,7 +409,7 @@ fn enters(body: &[Vec<DVec3>], [from, to]: [DVec3; 2], by: f64) -> bool {
     })
 }
 
-/// A floor, a tilted light above it, and boxes, tilted or standing on the floor.
+/// A floor, a tilted light above it, and boxes: some stand on the floor, some hang tilted, some reach through it.
 fn clutter() -> impl Strategy<Value = Vec<Vec<DVec3>>> {
     let unit = || prop::array::uniform3(-1.0..1.0f64).prop_map(DVec3::from);
     let tilt = |scale: f64| unit().prop_map(move |axis| DQuat::from_scaled_axis(axis * scale));
@@ -381,7 +421,7 @@ fn clutter() -> impl Strategy<Value = Vec<Vec<DVec3>>> {
         for (place, size, tilt, stands) in boxes {
             let half = DVec3::from(size) / 2.0;
             let turn = |corner: DVec3| if stands { corner } else { tilt * corner };
-            let centre = if stands { v(place.x, place.y, half.z) } else { place + v(0.0, 0.0, 2.0) };
+            let centre = if stands { v(place.x, place.y, half.z) } else { place + v(0.0, 0.0, 1.0) };
             let faces = cuboid(-half, half);
             // Every corner is computed once, so that the faces weld.
             outlines.extend(faces.into_iter().map(|face| face.into_iter().map(|p| turn(p) + centre).collect()));
