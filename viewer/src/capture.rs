@@ -1,17 +1,17 @@
 //! Headless pictures: a frame drawn by the adapter and read back.
 
 use glam::Vec3;
-use scene::{Baked, Exposure};
+use scene::{Baked, Camera, Exposure};
 
 use crate::{
-    Frame, Gpu, Picture, ViewerError,
+    Frame, Gpu, Mode, Picture, ViewerError,
     frame::{Targets, encode_frame},
     gpu::{ResidentBake, guarded},
     records::Records,
     twin::Twin,
 };
 
-/// Draws a picture of a bake on a graphics adapter.
+/// Draws a picture of a bake on a graphics adapter; for more than one, see [`Capture`].
 ///
 /// # Errors
 /// Any [`ViewerError`] but those of a window: an empty or too large picture, an invalid camera, a bake too large for the
@@ -20,52 +20,75 @@ pub fn draw_on_gpu(gpu: &Gpu, baked: &Baked, frame: &Frame) -> Result<Picture, V
     if !frame.camera.is_valid() {
         return Err(ViewerError::InvalidCamera);
     }
-    let targets = Targets::new(gpu, frame.width, frame.height)?;
+    let capture = Capture::new(gpu, baked, frame.width, frame.height)?;
     let exposure = frame.exposure.unwrap_or_else(|| Twin::new(baked).meter(&frame.camera, frame.width, frame.height));
-    let bake = ResidentBake::upload(gpu, &Records::of(baked))?;
-    capture(gpu, &bake, &targets, frame, exposure)
+    capture.draw(&frame.camera, frame.mode, exposure)
 }
 
-/// Draws a frame and reads it back.
-fn capture(
-    gpu: &Gpu,
-    bake: &ResidentBake,
-    targets: &Targets,
-    frame: &Frame,
-    exposure: Exposure,
-) -> Result<Picture, ViewerError> {
-    let (width, height) = (frame.width, frame.height);
-    let picture = ReadBack::new(gpu, width, height, size_of::<[f32; 4]>() as u32)?;
-    let shown = ReadBack::new(gpu, width, height, size_of::<[u8; 4]>() as u32)?;
-    let output = guarded(&gpu.device, || {
-        let output = gpu.device.create_texture(&wgpu::TextureDescriptor {
-            label: Some("output"),
-            size: targets.picture.size(),
-            mip_level_count: 1,
-            sample_count: 1,
-            dimension: wgpu::TextureDimension::D2,
-            format: wgpu::TextureFormat::Rgba8Unorm,
-            usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::COPY_SRC,
-            view_formats: &[],
-        });
-        let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        let view = output.create_view(&wgpu::TextureViewDescriptor::default());
-        encode_frame(gpu, &mut encoder, bake, targets, frame, exposure, &view);
-        picture.copy(&mut encoder, &targets.picture);
-        shown.copy(&mut encoder, &output);
-        gpu.queue.submit([encoder.finish()]);
-    });
-    output?;
-    let texels: Vec<[f32; 4]> = picture.read(gpu)?;
-    let bytes: Vec<[u8; 4]> = shown.read(gpu)?;
-    Ok(Picture {
-        width,
-        height,
-        radiance: texels.iter().map(|&[r, g, b, _]| Vec3::new(r, g, b)).collect(),
-        rgb: bytes.iter().map(|&[r, g, b, _]| [r, g, b]).collect(),
-        background: texels.iter().filter(|texel| texel[3] == 0.0).count() as u64,
-        exposure,
-    })
+/// A bake in an adapter's memory, and everything that pictures of one size need: for drawing many.
+pub struct Capture<'a> {
+    gpu: &'a Gpu,
+    bake: ResidentBake,
+    targets: Targets,
+    output: wgpu::Texture,
+    picture: ReadBack,
+    shown: ReadBack,
+}
+
+impl<'a> Capture<'a> {
+    /// Brings a bake that validates into the adapter's memory, to draw pictures of a size in pixels.
+    ///
+    /// # Errors
+    /// As [`draw_on_gpu`].
+    pub fn new(gpu: &'a Gpu, baked: &Baked, width: u32, height: u32) -> Result<Self, ViewerError> {
+        let targets = Targets::new(gpu, width, height)?;
+        let bake = ResidentBake::upload(gpu, &Records::of(baked))?;
+        let output = guarded(&gpu.device, || {
+            gpu.device.create_texture(&wgpu::TextureDescriptor {
+                label: Some("output"),
+                size: targets.picture.size(),
+                mip_level_count: 1,
+                sample_count: 1,
+                dimension: wgpu::TextureDimension::D2,
+                format: wgpu::TextureFormat::Rgba8Unorm,
+                usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::COPY_SRC,
+                view_formats: &[],
+            })
+        })?;
+        let picture = ReadBack::new(gpu, &targets.picture)?;
+        let shown = ReadBack::new(gpu, &output)?;
+        Ok(Self { gpu, bake, targets, output, picture, shown })
+    }
+
+    /// Draws a picture and reads it back.
+    ///
+    /// # Errors
+    /// [`ViewerError::InvalidCamera`], and [`ViewerError::Driver`] when the driver fails.
+    pub fn draw(&self, camera: &Camera, mode: Mode, exposure: Exposure) -> Result<Picture, ViewerError> {
+        if !camera.is_valid() {
+            return Err(ViewerError::InvalidCamera);
+        }
+        let (width, height) = (self.targets.width, self.targets.height);
+        let frame = Frame { camera: *camera, width, height, mode, exposure: Some(exposure) };
+        guarded(&self.gpu.device, || {
+            let mut encoder = self.gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+            let view = self.output.create_view(&wgpu::TextureViewDescriptor::default());
+            encode_frame(self.gpu, &mut encoder, &self.bake, &self.targets, &frame, exposure, &view);
+            self.picture.copy(&mut encoder, &self.targets.picture);
+            self.shown.copy(&mut encoder, &self.output);
+            self.gpu.queue.submit([encoder.finish()]);
+        })?;
+        let texels: Vec<[f32; 4]> = self.picture.read(self.gpu)?;
+        let bytes: Vec<[u8; 4]> = self.shown.read(self.gpu)?;
+        Ok(Picture {
+            width,
+            height,
+            radiance: texels.iter().map(|&[r, g, b, _]| Vec3::new(r, g, b)).collect(),
+            rgb: bytes.iter().map(|&[r, g, b, _]| [r, g, b]).collect(),
+            background: texels.iter().filter(|texel| texel[3] == 0.0).count() as u64,
+            exposure,
+        })
+    }
 }
 
 /// A buffer that a texture is copied to and the host reads.
@@ -78,9 +101,11 @@ struct ReadBack {
 }
 
 impl ReadBack {
-    fn new(gpu: &Gpu, width: u32, height: u32, pixel: u32) -> Result<Self, ViewerError> {
+    /// A buffer for the pixels of a texture.
+    fn new(gpu: &Gpu, texture: &wgpu::Texture) -> Result<Self, ViewerError> {
         let limits = gpu.device.limits();
-        let row = width * pixel;
+        let (width, height) = (texture.width(), texture.height());
+        let row = width * texture.format().block_copy_size(None).unwrap_or(0);
         let padded_row = row.next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
         let size = u64::from(padded_row) * u64::from(height);
         if size > limits.max_buffer_size {
@@ -117,13 +142,15 @@ impl ReadBack {
         let failed = |cause: &dyn std::fmt::Display| ViewerError::Driver(cause.to_string());
         gpu.device.poll(wgpu::PollType::wait_indefinitely()).map_err(|cause| failed(&cause))?;
         receiver.recv().map_err(|cause| failed(&cause))?.map_err(|cause| failed(&cause))?;
-        let bytes = self.buffer.get_mapped_range(..).map_err(|cause| failed(&cause))?;
         let mut pixels = Vec::with_capacity(self.row as usize / size_of::<Pixel>() * self.height as usize);
+        let bytes = self.buffer.get_mapped_range(..).map_err(|cause| failed(&cause))?;
         for row in bytes.chunks_exact(self.padded_row as usize) {
             pixels.extend(
                 row[..self.row as usize].chunks_exact(size_of::<Pixel>()).map(bytemuck::pod_read_unaligned::<Pixel>),
             );
         }
+        drop(bytes);
+        self.buffer.unmap();
         Ok(pixels)
     }
 }
@@ -133,11 +160,10 @@ mod tests {
     #![allow(clippy::unwrap_used, clippy::print_stderr)]
 
     use glam::DVec3;
-    use scene::Camera;
 
     use super::*;
     use crate::{
-        Mode, draw_on_cpu,
+        draw_on_cpu,
         test_room::{camera, room},
     };
 
@@ -210,7 +236,7 @@ mod tests {
         let Some(gpu) = gpu() else { return };
         let room = room();
         for i in 0..12 {
-            let angle = f64::from(i) * 0.5236;
+            let angle = f64::from(i) * std::f64::consts::FRAC_PI_6;
             let eye = DVec3::new(1.9, 1.4, 1.2);
             let target = eye + DVec3::new(angle.cos(), angle.sin(), 0.3 * f64::from(i % 3) - 0.3);
             let camera = Camera { eye, target, ..camera() };

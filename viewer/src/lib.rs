@@ -22,7 +22,7 @@ mod twin;
 mod visibility_pass;
 mod window;
 
-pub use capture::draw_on_gpu;
+pub use capture::{Capture, draw_on_gpu};
 pub use controls::{Flight, Steering};
 pub use error::ViewerError;
 pub use gpu::Gpu;

@@ -89,6 +89,8 @@ impl FromStr for Mode {
 
 #[cfg(test)]
 mod tests {
+    #![allow(clippy::unwrap_used)]
+
     use super::*;
 
     #[test]

@@ -67,7 +67,7 @@ pub fn open_window(baked: &Baked, camera: Camera, mode: Mode, exposure: Option<E
     if !camera.is_valid() {
         return Err(ViewerError::InvalidCamera);
     }
-    let event_loop = EventLoop::new().map_err(|cause| ViewerError::NoDisplay(cause.to_string()))?;
+    let event_loop = EventLoop::new().map_err(|cause| no_display(&cause))?;
     let mut walk = Walk {
         baked,
         twin: Twin::new(baked),
@@ -80,8 +80,16 @@ pub fn open_window(baked: &Baked, camera: Camera, mode: Mode, exposure: Option<E
         stage: None,
         failure: None,
     };
-    event_loop.run_app(&mut walk).map_err(|cause| ViewerError::NoDisplay(cause.to_string()))?;
+    event_loop.run_app(&mut walk).map_err(|cause| no_display(&cause))?;
     walk.failure.map_or(Ok(()), Err)
+}
+
+fn no_display(cause: &dyn std::fmt::Display) -> ViewerError {
+    let cause = cause.to_string();
+    // winit begins with the line of its source that noticed, which says nothing to a user.
+    let told =
+        cause.strip_prefix("os error at ").and_then(|rest| rest.split_once(": ")).map(|(_, told)| told.to_owned());
+    ViewerError::NoDisplay(told.unwrap_or(cause))
 }
 
 /// A walk through a bake.
@@ -164,7 +172,7 @@ impl ApplicationHandler for Walk<'_> {
     fn window_event(&mut self, event_loop: &ActiveEventLoop, _: WindowId, event: WindowEvent) {
         let mut redraw = self.hands.follow(&event);
         match event {
-            WindowEvent::CloseRequested => event_loop.exit(),
+            WindowEvent::CloseRequested | WindowEvent::Destroyed => event_loop.exit(),
             WindowEvent::Resized(size) => {
                 if let Some(stage) = &mut self.stage {
                     let resized = stage.resize(size);
@@ -219,12 +227,12 @@ impl Hands {
     /// Notes an event; true when it moves the flight.
     fn follow(&mut self, event: &WindowEvent) -> bool {
         match event {
-            WindowEvent::KeyboardInput { event: KeyEvent { physical_key, state, .. }, .. } => {
-                if let PhysicalKey::Code(key) = *physical_key {
-                    self.keys.retain(|&held| held != key);
-                    if state.is_pressed() {
-                        self.keys.push(key);
-                    }
+            &WindowEvent::KeyboardInput {
+                event: KeyEvent { physical_key: PhysicalKey::Code(key), state, .. }, ..
+            } => {
+                self.keys.retain(|&held| held != key);
+                if state.is_pressed() {
+                    self.keys.push(key);
                 }
             }
             WindowEvent::MouseInput { state, .. } => {
@@ -293,7 +301,6 @@ struct Stage {
 impl Stage {
     fn open(event_loop: &ActiveEventLoop, baked: &Baked, mode: Mode) -> Result<Self, ViewerError> {
         let attributes = Window::default_attributes().with_title(title(mode)).with_inner_size(SIZE);
-        let no_display = |cause: &dyn std::fmt::Display| ViewerError::NoDisplay(cause.to_string());
         let window = Arc::new(event_loop.create_window(attributes).map_err(|cause| no_display(&cause))?);
         let display = Box::new(event_loop.owned_display_handle());
         let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_with_display_handle(display).with_env());
@@ -346,7 +353,7 @@ impl Stage {
             wgpu::CurrentSurfaceTexture::Outdated => return self.configure().map(|()| false),
             wgpu::CurrentSurfaceTexture::Lost => {
                 let surface = self.instance.create_surface(self.window.clone());
-                self.surface = surface.map_err(|cause| ViewerError::NoDisplay(cause.to_string()))?;
+                self.surface = surface.map_err(|cause| no_display(&cause))?;
                 return self.configure().map(|()| false);
             }
         };
@@ -380,5 +387,12 @@ mod tests {
         assert!((once.ev - often.ev).abs() < 1e-4 && once.ev < dark.ev);
         assert_eq!(adapt(dark, bright, 10.0), bright);
         assert_eq!(adapt(dark, dark, 0.0), dark);
+    }
+
+    #[test]
+    fn the_reason_for_no_display_names_no_source_line() {
+        let error = no_display(&"os error at /crates/winit/mod.rs:765: neither X nor Y is set.");
+        assert_eq!(error.to_string(), "no window can be opened here: neither X nor Y is set.");
+        assert_eq!(no_display(&"exit: 3").to_string(), "no window can be opened here: exit: 3");
     }
 }
