@@ -5,9 +5,10 @@ use rayon::prelude::*;
 use scene::{Baked, BakedElement, BakedTriangle, DiscontinuityLine, HalfEdges, Provenance, Scene};
 use solver::{Gather, Solution};
 
+use crate::probe::PROBES;
 use crate::{
-    Discontinuity, Leaf, LeafSegment, Mesh, MeshStatistics, Progress, SampleQuery, discontinuities, edge_table,
-    evaluate_samples, leaf_meshes, probe, rank, sample_table,
+    Discontinuity, Leaf, LeafSegment, Mesh, MeshStatistics, Progress, RankedLine, SampleQuery, discontinuities,
+    edge_table, evaluate_samples, leaf_meshes, probe, rank, sample_table,
 };
 
 /// What a bake is asked for.
@@ -43,7 +44,8 @@ pub struct BakeStatistics {
     pub mesh: MeshStatistics,
 }
 
-/// The share of the work that comes before the samples, for the progress: a few per cent as measured.
+/// The share of the work that the progress gives to all that comes before the samples. With interreflection it is less,
+/// with direct light alone more.
 const MESH_SHARE: f64 = 0.05;
 
 /// Bakes a solved scene. The provenance is left empty.
@@ -65,15 +67,12 @@ pub fn bake(
         queries.iter().map(|query| leaf.irradiance(query.position, query.inward)).collect()
     };
     let table = sample_table(scene, &leaves, &mesh, &|polygon, position| gather.contact(polygon, position));
-    let (to_sample, to_probe) = (table.queries.len() as f64, 3.0 * mesh.triangles.len() as f64);
-    let stage = |done: f64, share: f64| {
-        let fraction = done / (to_sample + to_probe).max(1.0);
-        move |part: f64| progress(MESH_SHARE + (1.0 - MESH_SHARE) * (fraction + share * part))
-    };
-    let sampled = to_sample / (to_sample + to_probe).max(1.0);
-    let values = evaluate_samples(&table.queries, &evaluate, &stage(0.0, sampled));
+    let (to_sample, to_probe) = (table.queries.len() as f64, (PROBES.len() * mesh.triangles.len()) as f64);
+    let sampling = (1.0 - MESH_SHARE) * to_sample / (to_sample + to_probe).max(1.0);
+    let stage = |from: f64, to: f64| move |part: f64| progress(from + (to - from) * part);
+    let values = evaluate_samples(&table.queries, &evaluate, &stage(MESH_SHARE, MESH_SHARE + sampling));
     let samples: Vec<Vec3> = values.iter().map(|value| value.as_vec3()).collect();
-    let probes = probe(&leaves, &mesh, &table, &samples, &evaluate, &stage(to_sample, 1.0 - sampled));
+    let probes = probe(&leaves, &mesh, &table, &samples, &evaluate, &stage(MESH_SHARE + sampling, 1.0));
     progress(1.0);
 
     let (vertices, triangles) = stored_triangles(&leaves, &mesh, &table.triangles);
@@ -132,7 +131,7 @@ fn divided_leaves(
         .map(|(polygon, element)| {
             let outline = elements.outline(element);
             let ranked = rank(scene, outline, &found[polygon as usize], count);
-            let segment = |line: crate::RankedLine| LeafSegment { ends: line.ends, line: line.discontinuity };
+            let segment = |line: RankedLine| LeafSegment { ends: line.ends, line: line.discontinuity };
             let segments = ranked.into_iter().map(segment).collect();
             Leaf { element, polygon, outline: outline.to_vec(), segments }
         })

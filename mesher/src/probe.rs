@@ -14,7 +14,7 @@ use crate::{Leaf, Mesh, SampleQuery, SampleTable};
 /// quadratics. A cubic that vanishes at all six samples is a combination of the bubble s t (1 − s − t), of which these
 /// points see 93 % of its root mean square, and of p q (p − q) for the three edges, of which they see 132 %. (Unseen is
 /// their sum around the triangle; a fourth point would cost a third more.)
-const PROBES: [(f64, f64); 3] = [(1.0 / 6.0, 1.0 / 6.0), (2.0 / 3.0, 1.0 / 6.0), (1.0 / 6.0, 2.0 / 3.0)];
+pub(crate) const PROBES: [(f64, f64); 3] = [(1.0 / 6.0, 1.0 / 6.0), (2.0 / 3.0, 1.0 / 6.0), (1.0 / 6.0, 2.0 / 3.0)];
 
 /// Errors that probing found.
 #[derive(Clone, Debug, Default, PartialEq)]
