@@ -23,7 +23,6 @@ mod visibility_pass;
 mod window;
 
 pub use capture::{Capture, draw_on_gpu};
-pub use controls::{Flight, Steering};
 pub use error::ViewerError;
 pub use gpu::Gpu;
 pub use mode::{Mode, UnknownMode};

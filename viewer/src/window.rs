@@ -14,7 +14,8 @@ use winit::{
 };
 
 use crate::{
-    Flight, Frame, Gpu, Mode, Steering, ViewerError,
+    Frame, Gpu, Mode, ViewerError,
+    controls::{Flight, Steering},
     frame::{Targets, encode_frame},
     gpu::{ResidentBake, guarded, surface_format},
     records::Records,
@@ -304,7 +305,8 @@ impl Stage {
         let window = Arc::new(event_loop.create_window(attributes).map_err(|cause| no_display(&cause))?);
         let display = Box::new(event_loop.owned_display_handle());
         let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_with_display_handle(display).with_env());
-        let surface = instance.create_surface(window.clone()).map_err(|cause| no_display(&cause))?;
+        let surface = instance.create_surface(window.clone());
+        let surface = surface.map_err(|cause| ViewerError::NoAdapter(cause.to_string()))?;
         let gpu = Gpu::open(&instance, Some(&surface))?;
         let bake = ResidentBake::upload(&gpu, &Records::of(baked))?;
         let format = surface_format(&surface, &gpu.adapter)?;
