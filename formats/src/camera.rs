@@ -71,13 +71,14 @@ fn is_room(bvh: &Bvh, centre: DVec3) -> bool {
     })
 }
 
-/// OBJ files do not say which way is up: y, as most modellers have it, unless the lamps shine along −z.
+/// OBJ files do not say which way is up: y, as most modellers have it, unless the lamps shine more along z. (Down or up:
+/// many a lamp is wound the wrong way.)
 fn up_of(scene: &Scene) -> DVec3 {
     let shine: DVec3 = scene
         .emitters()
         .map(|polygon| area_vector(&scene.outline(polygon)) * luminance(scene.material(polygon).radiance))
         .sum();
-    if shine.z < shine.y && shine.z < 0.0 { DVec3::Z } else { DVec3::Y }
+    if shine.z.abs() > shine.y.abs() { DVec3::Z } else { DVec3::Y }
 }
 
 #[cfg(test)]

@@ -60,13 +60,19 @@ fn repair(path: &Path, model: Model, report: &mut ImportReport) -> Result<Scene,
     let (vertices, stands_for) = weld(&model.positions, tolerance);
     report.welded_vertices = model.positions.len() - vertices.len();
 
-    let mut sorted = Sorted::default();
-    for mut face in model.faces {
-        for corner in &mut face.corners {
-            corner.vertex = stands_for[corner.vertex as usize];
-        }
-        sorted.take(face, |face| shape_of(&face.outline(&vertices), tolerance));
+    let mut faces = model.faces;
+    for face in &mut faces {
+        face.corners.iter_mut().for_each(|corner| corner.vertex = stands_for[corner.vertex as usize]);
+        face.corners = without_spikes(&face.corners);
     }
+    // Of faces at one place a lamp is the one that was meant, wherever it stands in the file.
+    faces.sort_by_key(|face| !model.materials[face.material as usize].emits());
+    let mut sorted = Sorted::default();
+    for face in faces {
+        let shape = shape_of(&face.outline(&vertices), tolerance);
+        sorted.take(face, shape);
+    }
+    sorted.faces.sort_by_key(|face| face.line);
     sorted.report(report);
     let count = sorted.faces.len();
     let (mut faces, united) = merge_triangles(sorted.faces, &vertices, COPLANARITY);
@@ -117,13 +123,8 @@ struct Sorted {
 
 impl Sorted {
     /// Takes a face with welded corners as it is, in pieces, or not at all.
-    fn take(&mut self, mut face: Face, shape_of: impl Fn(&Face) -> Shape) {
-        face.corners.dedup_by_key(|corner| corner.vertex);
-        while face.corners.len() > 1 && face.corners.first().map(|c| c.vertex) == face.corners.last().map(|c| c.vertex)
-        {
-            face.corners.pop();
-        }
-        let pieces = match shape_of(&face) {
+    fn take(&mut self, face: Face, shape: Shape) {
+        let pieces = match shape {
             Shape::Degenerate => return self.degenerate.push(face.line),
             Shape::Crossing => return self.crossing.push(face.line),
             _ if !self.known.insert(canonical(&face.corners)) => return self.repeated.push(face.line),
@@ -166,6 +167,30 @@ impl Sorted {
     }
 }
 
+/// An outline without corners that repeat the one before, and without ways out to a corner and straight back.
+fn without_spikes(corners: &[Corner]) -> Vec<Corner> {
+    let mut kept: Vec<Corner> = Vec::with_capacity(corners.len());
+    for &corner in corners {
+        kept.push(corner);
+        while let [.., before, last] = kept[..]
+            && (before.vertex == last.vertex || kept.len() > 2 && kept[kept.len() - 3].vertex == last.vertex)
+        {
+            kept.truncate(kept.len() - if before.vertex == last.vertex { 1 } else { 2 });
+        }
+    }
+    // The same where the end meets the start.
+    let mut closed = kept.as_slice();
+    while let [first, middle @ .., last] = closed {
+        closed = match middle {
+            _ if first.vertex == last.vertex => &closed[1..],
+            [second, ..] if second.vertex == last.vertex => &closed[2..],
+            [.., second] if first.vertex == second.vertex => &closed[..closed.len() - 2],
+            _ => break,
+        };
+    }
+    closed.to_vec()
+}
+
 /// The vertices of an outline from the smallest on: equal for outlines that differ in where they start alone.
 fn canonical(corners: &[Corner]) -> Vec<u32> {
     let mut vertices: Vec<u32> = corners.iter().map(|corner| corner.vertex).collect();
@@ -188,7 +213,9 @@ mod tests {
         let path = folder.path().join("room.obj");
         std::fs::write(&path, obj).unwrap();
         std::fs::write(folder.path().join("room.mtl"), mtl).unwrap();
-        read_scene(&path).map_err(|error| error.to_string())
+        // Without the folder, whose name is another each time.
+        let folder = format!("{}/", folder.path().display());
+        read_scene(&path).map_err(|error| error.to_string().replace(&folder, ""))
     }
 
     fn data(name: &str) -> Imported {
@@ -225,6 +252,24 @@ mod tests {
             "{:?}",
             report.warnings
         );
+    }
+
+    #[test]
+    fn an_outline_loses_its_repeated_corners_and_spikes() {
+        let tidy = |vertices: &[u32]| {
+            let corners: Vec<_> = vertices.iter().map(|&vertex| Corner { vertex, seam: 0 }).collect();
+            without_spikes(&corners).iter().map(|corner| corner.vertex).collect::<Vec<_>>()
+        };
+        assert_eq!(tidy(&[]), []);
+        assert_eq!(tidy(&[1, 1]).len(), 1);
+        assert!(tidy(&[1, 2, 1]).len() < 3);
+        assert_eq!(tidy(&[1, 1, 2, 3, 3]), [1, 2, 3]);
+        assert_eq!(tidy(&[1, 2, 9, 8, 9, 2, 3]), [1, 2, 3]);
+        assert_eq!(tidy(&[9, 8, 9, 1, 2, 3]), [9, 1, 2, 3]);
+        assert_eq!(tidy(&[8, 9, 1, 2, 3, 9]), [1, 2, 3, 9]);
+        assert_eq!(tidy(&[9, 1, 2, 3, 9, 8]), [9, 1, 2, 3]);
+        // A hole joined to the outline by a seam is no spike.
+        assert_eq!(tidy(&[1, 2, 3, 1, 4, 5, 6, 4]), [1, 2, 3, 1, 4, 5, 6, 4]);
     }
 
     #[test]
@@ -341,6 +386,17 @@ mod tests {
         assert_eq!((scene.polygons.len(), scene.cameras[0].name.as_str()), (3, "default"));
         assert_eq!((scene.area(0), scene.area(1), scene.area(2)), (16.0, 1.0, 0.25));
         assert_eq!(report.warnings, Vec::<String>::new());
+    }
+
+    #[test]
+    fn a_lamp_drawn_on_the_ceiling_is_the_one_that_stays() {
+        let mtl = b"newmtl lamp\nKd 0\nKe 1\nnewmtl ceiling\nKd 0.8\n";
+        let faces = ["usemtl ceiling\nf 1 2 3 4\n", "usemtl lamp\nf 2 3 4 1\n"];
+        for text in [faces.concat(), [faces[1], faces[0]].concat()] {
+            let obj = format!("mtllib room.mtl\n{SQUARE}{text}");
+            let Imported { scene, report } = read(obj.as_bytes(), mtl).unwrap();
+            assert_eq!((scene.polygons.len(), scene.emitters().count(), report.repeated_faces), (1, 1, 1));
+        }
     }
 
     /// Whatever comes out is a scene of convex, planar polygons.

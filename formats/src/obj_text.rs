@@ -4,6 +4,7 @@
 //! wrong indices make it panic, and polylines come out of it as faces. So every line that matters is checked here,
 //! where its number is known, and written to a clean text that holds nothing tobj could misread.
 
+use std::collections::HashSet;
 use std::fmt::Write;
 use std::path::Path;
 
@@ -43,6 +44,7 @@ pub(crate) fn check(path: &Path, text: &str) -> Result<ObjText, FormatError> {
     let mut checked = ObjText::default();
     // How many positions, texture coordinates and normals precede a line.
     let mut counts = [0usize; 3];
+    let mut known = HashSet::new();
     for (number, line) in whole_lines(text) {
         let wrong = |(cause, cure): Wrong| FormatError::line(path, number, cause, cure);
         if let Some(comment) = line.trim_start().strip_prefix('#') {
@@ -82,7 +84,7 @@ pub(crate) fn check(path: &Path, text: &str) -> Result<ObjText, FormatError> {
             "g" | "o" => writeln!(clean, "g {rest}"),
             "usemtl" => {
                 let name = if rest.is_empty() { "unnamed" } else { rest };
-                if !checked.materials.iter().any(|(_, known)| known == name) {
+                if known.insert(name.to_owned()) {
                     checked.materials.push((number, name.to_owned()));
                 }
                 writeln!(clean, "usemtl {name}")

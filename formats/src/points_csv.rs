@@ -1,7 +1,7 @@
 //! Tables of points: where irradiance is asked for, and what it is there.
 
 use std::fs;
-use std::io::Write;
+use std::io::{self, Write};
 use std::path::Path;
 
 use glam::DVec3;
@@ -35,16 +35,19 @@ pub fn read_points(path: &Path) -> Result<Vec<SurfaceQuery>, FormatError> {
     let mut places = [0; 6];
     for (place, column) in places.iter_mut().zip(COLUMNS) {
         *place = header.iter().position(|name| name == column.as_bytes()).ok_or_else(|| {
-            let line = header.position().map_or(1, csv::Position::line) as usize;
             let cause = format!("the header has no column {column}");
-            FormatError::line(path, line, cause, "start the table with the header x,y,z,nx,ny,nz")
+            FormatError::line(
+                path,
+                line_of(header.position(), &bytes),
+                cause,
+                "start the table with the header x,y,z,nx,ny,nz",
+            )
         })?;
     }
     let mut queries = Vec::new();
     for record in reader.byte_records() {
         let record = record.map_err(|error| unreadable(path, &error))?;
-        let line = record.position().map_or(0, csv::Position::line) as usize;
-        let wrong = |cause, cure| FormatError::line(path, line, cause, cure);
+        let wrong = |cause, cure| FormatError::line(path, line_of(record.position(), &bytes), cause, cure);
         let mut values = [0.0; 6];
         for ((value, place), column) in values.iter_mut().zip(places).zip(COLUMNS) {
             let field = record.get(place).map(String::from_utf8_lossy).unwrap_or_default();
@@ -63,6 +66,15 @@ pub fn read_points(path: &Path) -> Result<Vec<SurfaceQuery>, FormatError> {
     Ok(queries)
 }
 
+/// The line of a record. The library's own count stops at the comments and empty lines before it.
+fn line_of(position: Option<&csv::Position>, bytes: &[u8]) -> usize {
+    let (line, start) = position.map_or((1, 0), |position| (position.line() as usize, position.byte() as usize));
+    let lines = bytes.get(start..).unwrap_or_default().split(|&byte| byte == b'\n');
+    let before = lines.take_while(|text| text.starts_with(b"#") || text.trim_ascii().is_empty()).count();
+    // In a file without any record all lines come before it.
+    (line + before).min(bytes.split(|&byte| byte == b'\n').count())
+}
+
 fn unreadable(path: &Path, error: &csv::Error) -> FormatError {
     let line = error.position().map_or(1, csv::Position::line) as usize;
     FormatError::line(path, line, format!("is no CSV ({error})"), "write a comma-separated table")
@@ -72,15 +84,17 @@ fn unreadable(path: &Path, error: &csv::Error) -> FormatError {
 /// is none. Every number reads back as the same f64.
 ///
 /// # Errors
-/// A stream that breaks.
-///
-/// # Panics
-/// Never; of lists of different lengths the longer one's rest is left out.
+/// A stream that breaks, or lists of different lengths.
 pub fn write_irradiance(
     mut to: impl Write,
     queries: &[SurfaceQuery],
     irradiance: &[Option<Rgb>],
 ) -> Result<(), FormatError> {
+    debug_assert_eq!(queries.len(), irradiance.len());
+    if queries.len() != irradiance.len() {
+        let cause = format!("{} points have {} values", queries.len(), irradiance.len());
+        return Err(io::Error::new(io::ErrorKind::InvalidInput, cause).into());
+    }
     writeln!(to, "{},er,eg,eb", COLUMNS.join(","))?;
     for (query, irradiance) in queries.iter().zip(irradiance) {
         for value in query.position.to_array().into_iter().chain(query.normal.to_array()) {
@@ -115,6 +129,7 @@ mod tests {
             ("x,y,z,nx,ny\n1,2,3,4,5\n", 1, "no column nz"),
             ("# points\nx,y,z,nx,ny,nz\n1,2,3,0,0\n", 3, "the field nz holds \"\""),
             ("x,y,z,nx,ny,nz\n1,2,3,0,0,1\n# so far so good\n1,two,3,0,0,1\n", 4, "the field y holds \"two\""),
+            ("# no\n\n# header\n1,2,3,0,0,1\n", 4, "no column x"),
             ("x,y,z,nx,ny,nz\n1,2,inf,0,0,1\n", 2, "the field z holds \"inf\""),
             ("x,y,z,nx,ny,nz\n1,2,NaN,0,0,1\n", 2, "the field z"),
             ("x,y,z,nx,ny,nz\n1,2,3,0,0,0\n", 2, "no direction"),
@@ -140,6 +155,7 @@ mod tests {
         let query = SurfaceQuery { position: DVec3::ONE, normal: DVec3::Z };
         let mut text = Vec::new();
         write_irradiance(&mut text, &[query; 2], &[None, Some(Rgb::new(0.1, 1e-30, 3e300))]).unwrap();
+        assert!(write_irradiance(io::sink(), &[query], &[]).is_err());
         let text = String::from_utf8(text).unwrap();
         let point = "1.0,1.0,1.0,0.0,0.0,1.0";
         assert_eq!(text, format!("x,y,z,nx,ny,nz,er,eg,eb\n{point},,,\n{point},0.1,1e-30,3e300\n"));
