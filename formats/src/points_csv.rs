@@ -90,7 +90,6 @@ pub fn write_irradiance(
     queries: &[SurfaceQuery],
     irradiance: &[Option<Rgb>],
 ) -> Result<(), FormatError> {
-    debug_assert_eq!(queries.len(), irradiance.len());
     if queries.len() != irradiance.len() {
         let cause = format!("{} points have {} values", queries.len(), irradiance.len());
         return Err(io::Error::new(io::ErrorKind::InvalidInput, cause).into());
