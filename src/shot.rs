@@ -169,6 +169,7 @@ impl Reference {
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
+    use glam::DVec3;
     use scene::NamedCamera;
 
     use super::*;

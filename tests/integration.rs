@@ -11,6 +11,7 @@ mod determinism;
 mod fixture;
 mod golden;
 mod known_issues;
+mod licences;
 mod parity;
 mod readme;
 mod reference;
