@@ -13,6 +13,7 @@ use crate::pipeline;
 use crate::progress::{Stage, say};
 
 /// A file that a command was given.
+#[expect(clippy::large_enum_variant, reason = "one exists in a run")]
 pub enum Input {
     /// A scene.
     Scene(Scene),

@@ -27,7 +27,6 @@ pub fn bake(scene: &Scene, flags: &LightFlags) -> (Baked, BakeReport) {
     let options = BakeOptions {
         discontinuities: flags.discontinuities.unwrap_or(defaults.discontinuities),
         min_weight: flags.min_weight.unwrap_or(defaults.min_weight),
-        ..defaults
     };
     let (mut baked, statistics) = mesher::bake(scene, &solution, &options, &|fraction| stage.advance(fraction));
     let mesh_seconds = stage.end();
