@@ -5,7 +5,6 @@ use rayon::prelude::*;
 use scene::{Baked, BakedElement, BakedTriangle, DiscontinuityLine, HalfEdges, Provenance, Scene};
 use solver::{Gather, Solution};
 
-use crate::probe::PROBES;
 use crate::{
     Discontinuity, Leaf, LeafSegment, Mesh, MeshStatistics, Progress, RankedLine, SampleQuery, discontinuities,
     edge_table, evaluate_samples, leaf_meshes, probe, rank, sample_table,
@@ -67,7 +66,7 @@ pub fn bake(
         queries.iter().map(|query| leaf.irradiance(query.position, query.inward)).collect()
     };
     let table = sample_table(scene, &leaves, &mesh, &|polygon, position| gather.contact(polygon, position));
-    let (to_sample, to_probe) = (table.queries.len() as f64, (PROBES.len() * mesh.triangles.len()) as f64);
+    let (to_sample, to_probe) = (table.queries.len() as f64, mesh.triangles.len() as f64);
     let sampling = (1.0 - MESH_SHARE) * to_sample / (to_sample + to_probe).max(1.0);
     let stage = |from: f64, to: f64| move |part: f64| progress(from + (to - from) * part);
     let values = evaluate_samples(&table.queries, &evaluate, &stage(MESH_SHARE, MESH_SHARE + sampling));

@@ -12,6 +12,7 @@ use std::ops::Range;
 
 use glam::DVec3;
 
+use crate::bounding_cone::BoundingCone;
 use crate::clip::{Position, clip_convex, locate};
 use crate::form_factor::point_form_factor;
 
@@ -24,8 +25,9 @@ pub const PLANE_TOLERANCE: f64 = 1e-13;
 pub const SLIVER: f64 = 1e-14;
 
 /// What a blocker hides from a point: a convex cone of directions.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct BlockerCone {
+    bounds: BoundingCone,
     corners: Vec<DVec3>,
     /// Inward unit normals of the planes through the point and each edge.
     planes: Vec<DVec3>,
@@ -64,6 +66,11 @@ impl BlockerCone {
         }
     }
 
+    /// Whether a direction lies inside.
+    pub fn contains(&self, direction: DVec3) -> bool {
+        self.planes.iter().all(|plane| plane.dot(direction) > 0.0)
+    }
+
     /// The cone over corners given relative to the point, in either orientation. None where it has no solid angle.
     fn new(corners: Vec<DVec3>) -> Option<Self> {
         let middle: DVec3 = corners.iter().map(|corner| corner.normalize_or_zero()).sum();
@@ -83,15 +90,18 @@ impl BlockerCone {
         if facing < 0.0 {
             planes.iter_mut().for_each(|plane| *plane = -*plane);
         }
-        Some(Self { corners, planes })
+        Some(Self { bounds: BoundingCone::around(&corners), corners, planes })
     }
 }
 
 /// Fragments of one source, as seen from one point. The buffers are reused from source to source.
 #[derive(Clone, Debug, Default)]
 pub struct Fragments {
+    bounds: Option<BoundingCone>,
     points: Vec<DVec3>,
     ranges: Vec<Range<usize>>,
+    /// Form factor of each fragment, once measured.
+    factors: Vec<f64>,
     spare: Vec<Range<usize>>,
     corners: Vec<DVec3>,
     tolerance: f64,
@@ -108,6 +118,8 @@ impl Fragments {
     pub fn start(&mut self, corners: &[DVec3], normal: DVec3) {
         self.points.clear();
         self.ranges.clear();
+        self.factors.clear();
+        self.bounds = None;
         clip_convex(corners, self.tolerance, |d| normal.dot(d), &mut self.points);
         if !self.points.is_empty() {
             self.ranges.push(0..self.points.len());
@@ -116,6 +128,12 @@ impl Fragments {
 
     /// Cuts away what a blocker hides.
     pub fn subtract(&mut self, blocker: &BlockerCone) {
+        let Some(whole) = self.ranges.first() else { return };
+        // Before the first blocker there is one fragment: the source.
+        let bounds = *self.bounds.get_or_insert_with(|| BoundingCone::around(&self.points[whole.clone()]));
+        if bounds.misses(&blocker.bounds) {
+            return;
+        }
         self.spare.clear();
         std::mem::swap(&mut self.ranges, &mut self.spare);
         let fragments = std::mem::take(&mut self.spare);
@@ -149,6 +167,9 @@ impl Fragments {
     fn carve(&mut self, fragment: Range<usize>, blocker: &BlockerCone) {
         let mut rest = fragment;
         for &plane in &blocker.planes {
+            if self.points[rest.clone()].iter().all(|point| plane.dot(*point) >= -self.tolerance) {
+                continue;
+            }
             let outer = self.clipped(rest.clone(), -plane);
             if !outer.is_empty() {
                 self.ranges.push(outer);
@@ -174,20 +195,24 @@ impl Fragments {
         self.ranges.is_empty()
     }
 
-    /// Drops fragments that are mere rounding; after the last blocker.
-    pub fn drop_slivers(&mut self, normal: DVec3) {
-        let points = &self.points;
-        self.ranges.retain(|range| point_form_factor(&points[range.clone()], normal) > SLIVER);
+    /// Measures the form factor of each fragment, and drops those that are mere rounding. Returns the sum. To be called
+    /// after the last blocker.
+    pub fn measure(&mut self, normal: DVec3) -> f64 {
+        let (points, factors) = (&self.points, &mut self.factors);
+        factors.clear();
+        self.ranges.retain(|range| {
+            let factor = point_form_factor(&points[range.clone()], normal);
+            if factor > SLIVER {
+                factors.push(factor);
+            }
+            factor > SLIVER
+        });
+        factors.iter().sum()
     }
 
-    /// The fragments: convex cones, corners relative to the point.
-    pub fn iter(&self) -> impl Iterator<Item = &[DVec3]> {
-        self.ranges.iter().map(|range| &self.points[range.clone()])
-    }
-
-    /// Form factor from the point to what it sees of the source.
-    pub fn form_factor(&self, normal: DVec3) -> f64 {
-        self.iter().map(|fragment| point_form_factor(fragment, normal)).sum()
+    /// The measured fragments with their form factors: convex cones, corners relative to the point.
+    pub fn iter(&self) -> impl Iterator<Item = (&[DVec3], f64)> {
+        self.ranges.iter().map(|range| &self.points[range.clone()]).zip(self.factors.iter().copied())
     }
 }
 
@@ -251,7 +276,7 @@ mod tests {
                 fragments.subtract(&cone);
             }
         }
-        fragments.form_factor(DVec3::Z)
+        fragments.measure(DVec3::Z)
     }
 
     #[test]
@@ -319,7 +344,7 @@ mod tests {
             assert!(fragments.is_empty());
             fragments.start(seen, DVec3::Z);
             fragments.subtract(&cone);
-            assert_eq!(fragments.form_factor(DVec3::Z), form_factor_at(DVec3::ZERO, DVec3::Z, seen));
+            assert_eq!(fragments.measure(DVec3::Z), form_factor_at(DVec3::ZERO, DVec3::Z, seen));
         }
     }
 
@@ -336,7 +361,7 @@ mod tests {
             let cone = Viewpoint { inward, ..FROM }.tangent_cone(&wall, DVec3::X, 1e-9);
             let mut fragments = Fragments::new(4.0);
             fragments.start(&cone, DVec3::Z);
-            let limit = fragments.form_factor(DVec3::Z);
+            let limit = fragments.measure(DVec3::Z);
             let near = form_factor_at(inward * 1e-7, DVec3::Z, &wall);
             assert!((limit - near).abs() < 1e-6 && limit > 0.1, "{limit} {near}");
         }

@@ -5,9 +5,11 @@
 
 mod backprojection;
 mod blocker;
+mod bounding_cone;
 mod clip;
 mod contour;
 mod cut;
+mod dim_source;
 mod element;
 mod form_factor;
 mod geometry;

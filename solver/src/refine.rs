@@ -203,9 +203,13 @@ impl Network {
         let centre = self.elements.nodes[pair.receiver as usize].centre;
         let corners = self.elements.outline(pair.receiver);
         let frame = self.frame(pair.receiver);
-        let mut samples: Vec<(DVec2, f64)> = Vec::with_capacity(corners.len() + 1);
+        let mut samples: Vec<(DVec2, f64)> = Vec::with_capacity(corners.len() + 3);
         let mut estimate = Estimate::default();
-        for corner in corners.iter().copied().chain([centre]) {
+        // The corners' samples are the quadrature and carry the plane. The others only tell how far the light is from it:
+        // the centre sees what is curved, and two edges what the corners and the centre miss by symmetry, as of a
+        // source whose own corner lies at a corner of the receiver.
+        let edges = corners.windows(2).take(2).map(|edge| (edge[0] + edge[1]) / 2.0);
+        for corner in corners.iter().copied().chain([centre]).chain(edges) {
             let position = centre + (corner - centre) * SAMPLE_REACH;
             let (unoccluded, visible) = if source.distance(position) > self.geometry.contact_tolerance {
                 let unoccluded = form_factor_at(position, receiver.normal, outline);
@@ -213,7 +217,6 @@ impl Network {
             } else {
                 (0.0, 0.0)
             };
-            // The quadrature is the corners'; the centre only tells how far the light is from linear.
             if samples.len() < corners.len() {
                 estimate.form_factor += unoccluded / corners.len() as f64;
                 estimate.visible += visible / corners.len() as f64;
@@ -221,7 +224,8 @@ impl Network {
             let offset = position - centre;
             samples.push((DVec2::new(frame.u.dot(offset), frame.v.dot(offset)), visible));
         }
-        let [gradient] = slope(samples.iter().map(|&(at, visible)| (at, [visible - estimate.visible], 1.0)));
+        let [gradient] =
+            slope(samples[..corners.len()].iter().map(|&(at, visible)| (at, [visible - estimate.visible], 1.0)));
         estimate.gradient = gradient;
         let strays = |&(at, visible): &(DVec2, f64)| (visible - estimate.visible - gradient.dot(at)).abs();
         estimate.deviation = samples.iter().map(strays).fold(0.0, f64::max) / SAMPLE_REACH.powi(2);
@@ -252,8 +256,7 @@ impl Network {
                 fragments.subtract(&cone);
             }
         }
-        fragments.drop_slivers(up);
-        fragments.form_factor(up)
+        fragments.measure(up)
     }
 
     fn make_link(&self, pair: &Pair, estimate: &Estimate) -> (Link, Estimate) {

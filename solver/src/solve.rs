@@ -105,8 +105,8 @@ mod tests {
         Builder::default()
             .material(reflectance, radiance)
             .cuboid([0.0, 0.0, 0.0], [4.0, 3.0, 2.5], true)
-            .sides([0.7, 0.5, 0.0].into(), [1.5, 1.4, 0.8].into(), false, [true, true, true, true, false, true])
-            .sides([2.2, 1.3, 0.9].into(), [3.5, 2.2, 1.0].into(), false, [true; 6])
+            .cuboid([0.7, 0.5, 0.05], [1.5, 1.4, 0.8], false)
+            .cuboid([2.2, 1.3, 0.9], [3.5, 2.2, 1.0], false)
             .build()
     }
 
@@ -124,7 +124,7 @@ mod tests {
     /// Closed enclosure of uniform exitance M and reflectance ρ: B = M/(1−ρ) everywhere.
     #[test]
     fn a_furnace_is_uniform() {
-        for (reflectance, radiance) in [(0.5, 0.01), (0.9, 0.002)] {
+        for (reflectance, radiance) in [(0.5, 0.2), (0.9, 0.04)] {
             let room =
                 Builder::default().material(reflectance, radiance).cuboid([0.0; 3], [2.0, 3.0, 1.0], true).build();
             let solution = solved(&room, 1e-4, None);
@@ -147,15 +147,21 @@ mod tests {
         let room = furnished(0.6, 1.0);
         let solution = solved(&room, 0.02, None);
         let laws = solution.validate(&room);
-        eprintln!("{laws:?}");
         assert!(laws.closure < 1e-3 && laws.energy < 1e-3, "{laws:?}");
-        assert!(laws.reciprocity < 2e-3, "{laws:?}");
+        assert!(laws.reciprocity < 1e-2, "{laws:?}");
         assert_eq!((laws.doubled_links, laws.bad_numbers), (0, 0));
+    }
+
+    /// What a point sees adds up to the hemisphere, to rounding, under the table and beside the box.
+    #[test]
+    fn visible_fragments_close_the_hemisphere() {
+        let room = furnished(0.0, 1.0);
+        let solution = solved(&room, 0.5, Some(0));
         let gather = Gather::new(&room, &solution);
-        // Exact visibility: what a point sees adds up to the hemisphere, under the table and beside the box.
-        for (x, y) in [(2.8, 1.7), (0.65, 0.9), (1.51, 1.0), (3.9, 0.1)] {
-            let irradiance = gather.irradiance_at(4, DVec3::new(x, y, 0.0), DVec3::ZERO);
-            assert!((irradiance.x / (std::f64::consts::PI / 0.4) - 1.0).abs() < 1e-3, "{irradiance}");
+        for (x, y) in [(2.8, 1.7), (0.65, 0.9), (0.7, 0.5), (1.51, 1.0), (1.1, 1.1), (3.9, 0.1), (4.0, 0.0)] {
+            let position = DVec3::new(x, y, 0.0);
+            let irradiance = gather.irradiance_at(4, position, DVec3::new(2.0, 1.5, 0.0) - position);
+            assert!((irradiance.x / std::f64::consts::PI - 1.0).abs() < 1e-9, "{position}: {irradiance}");
         }
     }
 
@@ -205,7 +211,7 @@ mod tests {
     fn bounces_add_up_to_convergence() {
         let room = furnished(0.5, 0.3);
         let at = |bounces: Option<u32>| {
-            let solution = solved(&room, 0.05, bounces);
+            let solution = solved(&room, 0.01, bounces);
             Gather::new(&room, &solution).irradiance_at(4, DVec3::new(3.0, 0.5, 0.0), DVec3::ZERO).x
         };
         let exitance = 0.3 * std::f64::consts::PI;

@@ -13,8 +13,8 @@ const CLOSURE_RAYS: u32 = 64;
 /// What a solution was measured to violate. All zero for a perfect one.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Validation {
-    /// Largest |A_i F_ij − A_j F_ji| over pairs of patches, visibility included, as a fraction of the smaller of the
-    /// two areas.
+    /// Σ |A_i F_ij − A_j F_ji| ÷ Σ A_i F_ij over pairs of patches, visibility included: what the two directions
+    /// disagree about, as a fraction of all that is exchanged.
     pub reciprocity: f64,
     /// Largest |1 − Σ F| over the closed patches, area-weighted over each: the form factors from a patch to all fronts
     /// that it sees add up to 1 where it sees nothing else.
@@ -56,11 +56,13 @@ impl Solution {
         let mut sums = vec![0.0; elements.patches.len()];
         let mut ordered: Vec<_> = exchanged.iter().collect();
         ordered.sort_unstable_by_key(|entry| entry.0);
+        let mut disagreement = 0.0;
         for (&(to, from), &there) in ordered {
             let back = exchanged.get(&(from, to)).copied().unwrap_or(0.0);
-            result.reciprocity = result.reciprocity.max((there - back).abs() / area(to).min(area(from)));
+            disagreement += (there - back).abs();
             sums[to as usize] += there;
         }
+        result.reciprocity = disagreement / sums.iter().sum::<f64>().max(f64::MIN_POSITIVE);
         let (mut weighted, mut total) = (0.0, 0.0);
         let bvh = Bvh::of_scene(scene);
         for (patch, &sum) in (0..).zip(&sums) {
