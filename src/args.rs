@@ -69,7 +69,7 @@ pub struct LightFlags {
     /// Largest number of discontinuities that one leaf follows (the paper's k)
     #[arg(long, value_name = "K", allow_negative_numbers = true)]
     pub discontinuities: Option<u32>,
-    /// Smallest weight, W/m², that a discontinuity must have to be followed (the paper's w_min)
+    /// Smallest weight, W/m², that a discontinuity must have to be followed (the paper's w_min) [default: from the brightest emitter]
     #[arg(long, value_name = "W", value_parser = non_negative, allow_hyphen_values = true)]
     pub min_weight: Option<f64>,
     /// Irradiance, W/m², that one link may misplace [default: from the scene's mean irradiance]

@@ -23,10 +23,9 @@ pub fn solve(scene: &Scene, flags: &LightFlags) -> (Solution, f64) {
 pub fn bake(scene: &Scene, flags: &LightFlags) -> (Baked, BakeReport) {
     let (solution, solve_seconds) = solve(scene, flags);
     let stage = Stage::start("mesh");
-    let defaults = BakeOptions::default();
     let options = BakeOptions {
-        discontinuities: flags.discontinuities.unwrap_or(defaults.discontinuities),
-        min_weight: flags.min_weight.unwrap_or(defaults.min_weight),
+        discontinuities: flags.discontinuities.unwrap_or(BakeOptions::default().discontinuities),
+        min_weight: flags.min_weight,
     };
     let (mut baked, statistics) = mesher::bake(scene, &solution, &options, &|fraction| stage.advance(fraction));
     let mesh_seconds = stage.end();
@@ -49,12 +48,12 @@ pub fn bake(scene: &Scene, flags: &LightFlags) -> (Baked, BakeReport) {
         seconds: Seconds { solve: solve_seconds, mesh: mesh_seconds, ..Seconds::default() },
         peak_memory_bytes: None,
     };
-    baked.provenance = provenance(&solution, &options, &report);
+    baked.provenance = provenance(&solution, &options, &report, statistics.min_weight);
     (baked, report)
 }
 
 /// What made a bake: the options as they were used, and the counts. No seconds: the same input gives the same bytes.
-fn provenance(solution: &Solution, options: &BakeOptions, report: &BakeReport) -> Provenance {
+fn provenance(solution: &Solution, options: &BakeOptions, report: &BakeReport, min_weight: f64) -> Provenance {
     let bounces = solution.bounces.map_or_else(|| "all".to_owned(), |bounces| bounces.to_string());
     let option = |name: &str, value: String| (name.to_owned(), value);
     let count = |name: &str, value: usize| (name.to_owned(), value as f64);
@@ -64,7 +63,7 @@ fn provenance(solution: &Solution, options: &BakeOptions, report: &BakeReport) -
             option(BOUNCES, bounces),
             option(LINK_ERROR, solution.link_error.to_string()),
             option("discontinuities", options.discontinuities.to_string()),
-            option("min-weight", options.min_weight.to_string()),
+            option("min-weight", min_weight.to_string()),
         ],
         statistics: vec![
             count("elements", report.elements),

@@ -66,23 +66,21 @@ impl BlockerCone {
         }
     }
 
-    /// Whether a direction lies inside.
-    pub fn contains(&self, direction: DVec3) -> bool {
-        self.planes.iter().all(|plane| plane.dot(direction) > 0.0)
-    }
-
     /// The cone over corners given relative to the point, in either orientation. None where it has no solid angle.
     fn new(corners: Vec<DVec3>) -> Option<Self> {
-        let middle: DVec3 = corners.iter().map(|corner| corner.normalize_or_zero()).sum();
+        // Unit vectors: the length of their cross product is the sine of an edge's angle, free of scale.
+        let mut corners = corners;
+        corners.iter_mut().for_each(|corner| *corner = corner.normalize_or_zero());
+        let middle: DVec3 = corners.iter().sum();
         let mut planes = Vec::with_capacity(corners.len());
         let mut facing = 0.0;
-        for (i, &corner) in corners.iter().enumerate() {
-            let next = corners[(i + 1) % corners.len()];
-            // The cross product of unit vectors: its length is the sine of the edge's angle, free of scale.
-            if let Some(plane) = corner.normalize_or_zero().cross(next.normalize_or_zero()).try_normalize() {
+        let mut corner = corners.last().copied().unwrap_or_default();
+        for &next in &corners {
+            if let Some(plane) = corner.cross(next).try_normalize() {
                 facing += plane.dot(middle);
                 planes.push(plane);
             }
+            corner = next;
         }
         if planes.len() < 3 || facing == 0.0 {
             return None;

@@ -7,15 +7,12 @@
 //!
 //! What we do differently: blockers in contact with the point enter by their limit ([`Viewpoint::tangent_cone`]).
 
-use std::borrow::Cow;
-
 use glam::DVec3;
 use scene::{Rgb, Scene, luminance};
 
 use crate::backprojection::{BlockerCone, Fragments, SLIVER, Viewpoint};
 use crate::blocker::Blocker;
 use crate::clip::{Position, clip_convex, locate};
-use crate::dim_source::DimSource;
 use crate::form_factor::point_form_factor;
 use crate::geometry::Geometry;
 use crate::solution::{ElementLight, Solution};
@@ -23,12 +20,7 @@ use crate::{LinkSource, NodeId};
 
 /// How much light a reflector's linear elements may misplace at a point before finer ones are opened, as a fraction
 /// of the scene's mean irradiance. Per source and point; smaller is slower in proportion to its square root.
-const SOURCE_BUDGET: f64 = 2e-3;
-
-/// Irradiance below which a source's outline is not worth its exact shadow, as a fraction of the scene's mean: it is
-/// seen whole or not at all, as its centre is. Dozens of chair legs and table edges take half of the time otherwise.
-/// Emitters are always exact.
-const DIM_SOURCE: f64 = 1e-3;
+const SOURCE_BUDGET: f64 = 6e-3;
 
 /// How other polygons touch a point of a polygon: how many values irradiance has there.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -51,10 +43,6 @@ pub struct Gather<'a> {
     geometry: Geometry,
     /// The luminance that [`SOURCE_BUDGET`] stands for, W·m⁻².
     budget: f64,
-    /// The luminance that [`DIM_SOURCE`] stands for, W·m⁻².
-    dim: f64,
-    /// Polygons that may be dim sources, by id.
-    dim_sources: Vec<Option<DimSource>>,
 }
 
 /// A gather for the points of one leaf element: sources and blockers that its links name.
@@ -62,27 +50,21 @@ pub struct LeafGather<'a> {
     gather: &'a Gather<'a>,
     polygon: u32,
     sources: Vec<Source>,
-    /// All blockers of all sources, ascending.
-    blockers: Vec<u32>,
+    /// Number of distinct blockers of all sources.
+    blocker_count: usize,
 }
 
 struct Source {
     polygon: u32,
-    blockers: Vec<Blocker>,
+    /// Each with the number that its polygon has among the leaf's blockers.
+    blockers: Vec<(usize, Blocker)>,
 }
 
 impl<'a> Gather<'a> {
     /// Prepares a gather over a solution of the scene.
     pub fn new(scene: &'a Scene, solution: &'a Solution) -> Self {
-        let mean = luminance(solution.mean_irradiance);
-        Self {
-            scene,
-            solution,
-            geometry: Geometry::new(scene),
-            budget: SOURCE_BUDGET * mean,
-            dim: DIM_SOURCE * mean,
-            dim_sources: scene.polygon_ids().map(|polygon| DimSource::of(scene, solution, polygon)).collect(),
-        }
+        let budget = SOURCE_BUDGET * luminance(solution.mean_irradiance);
+        Self { scene, solution, geometry: Geometry::new(scene), budget }
     }
 
     /// How other polygons touch a point of a polygon, on its front.
@@ -168,16 +150,19 @@ impl<'a> Gather<'a> {
         let mut blockers: Vec<u32> = pairs.iter().filter(|(s, b)| s != b).map(|&(_, blocker)| blocker).collect();
         blockers.sort_unstable();
         blockers.dedup();
-        let sources = pairs.chunk_by(|a, b| a.0 == b.0).map(|group| self.source(group)).collect();
-        LeafGather { gather: self, polygon, sources, blockers }
+        let sources = pairs.chunk_by(|a, b| a.0 == b.0).map(|group| self.source(group, &blockers)).collect();
+        LeafGather { gather: self, polygon, sources, blocker_count: blockers.len() }
     }
 
-    fn source(&self, group: &[(u32, u32)]) -> Source {
+    fn source(&self, group: &[(u32, u32)], all: &[u32]) -> Source {
         let polygon = group[0].0;
         let blockers = group
             .iter()
             .filter(|(source, blocker)| source != blocker)
-            .filter_map(|&(_, blocker)| Blocker::before(&self.geometry, &self.geometry.plane(polygon), blocker))
+            .filter_map(|&(_, blocker)| {
+                let number = all.partition_point(|&other| other < blocker);
+                Some((number, Blocker::before(&self.geometry, &self.geometry.plane(polygon), blocker)?))
+            })
             .collect();
         Source { polygon, blockers }
     }
@@ -226,7 +211,7 @@ impl LeafGather<'_> {
         let gather = self.gather;
         let up = gather.geometry.plane(self.polygon).normal;
         let from = Viewpoint { position, up, inward: inward.reject_from_normalized(up).normalize_or_zero() };
-        let mut cones: Vec<Option<Option<BlockerCone>>> = vec![None; self.blockers.len()];
+        let mut cones: Vec<Option<Option<BlockerCone>>> = vec![None; self.blocker_count];
         let mut fragments = Fragments::new(gather.geometry.size);
         let mut total = Rgb::ZERO;
         for source in &self.sources {
@@ -240,57 +225,35 @@ impl LeafGather<'_> {
                 }
                 fragments.start(&from.tangent_cone(outline, plane.normal, gather.geometry.contact_tolerance), up);
             } else if depth > 0.0 {
-                if let Some(dim) = gather.dim_sources[source.polygon as usize]
-                    .as_ref()
-                    .filter(|dim| dim.most_irradiance(depth, position) < gather.dim)
-                {
-                    let hidden = || {
-                        source.blockers.iter().any(|blocker| {
-                            self.cone_of(blocker, &mut cones, &from)
-                                .is_some_and(|cone| cone.contains(dim.centre - position))
-                        })
-                    };
-                    total += dim.irradiance(depth, &from, hidden);
-                    continue;
-                }
                 let corners: Vec<DVec3> = outline.iter().map(|corner| corner - position).collect();
                 fragments.start(&corners, up);
             } else {
                 continue;
             }
-            for blocker in &source.blockers {
+            for (number, blocker) in &source.blockers {
                 if fragments.is_empty() {
                     break;
                 }
-                if let Some(cone) = self.cone_of(blocker, &mut cones, &from) {
-                    fragments.subtract(&cone);
+                let (shape, normal) = blocker.shape(&gather.geometry);
+                let project = || BlockerCone::of_polygon(shape, normal, &from, gather.geometry.contact_tolerance);
+                match blocker {
+                    // A whole polygon looks the same before every source: projected once for the point.
+                    Blocker::Whole { .. } => {
+                        if let Some(cone) = cones[*number].get_or_insert_with(project) {
+                            fragments.subtract(cone);
+                        }
+                    }
+                    Blocker::Part { .. } => {
+                        if let Some(cone) = project() {
+                            fragments.subtract(&cone);
+                        }
+                    }
                 }
             }
             let form_factor = fragments.measure(up);
             total += self.light(source.polygon, &fragments, form_factor, touches, &from);
         }
         total
-    }
-
-    /// What a blocker hides from a point. A whole polygon looks the same before every source: `cones` keeps what was
-    /// projected for the point, by the index of the blocker.
-    fn cone_of<'c>(
-        &self,
-        blocker: &Blocker,
-        cones: &'c mut [Option<Option<BlockerCone>>],
-        from: &Viewpoint,
-    ) -> Option<Cow<'c, BlockerCone>> {
-        let geometry = &self.gather.geometry;
-        let (shape, normal) = blocker.shape(geometry);
-        let project = || BlockerCone::of_polygon(shape, normal, from, geometry.contact_tolerance);
-        let whole = match blocker {
-            Blocker::Whole { polygon } => self.blockers.binary_search(polygon).ok(),
-            Blocker::Part { .. } => None,
-        };
-        match whole {
-            Some(index) => cones[index].get_or_insert_with(project).as_ref().map(Cow::Borrowed),
-            None => project().map(Cow::Owned),
-        }
     }
 
     /// Irradiance from the visible fragments of one source.

@@ -9,7 +9,6 @@ mod bounding_cone;
 mod clip;
 mod contour;
 mod cut;
-mod dim_source;
 mod element;
 mod form_factor;
 mod geometry;
