@@ -22,7 +22,7 @@ pub const PLANE_TOLERANCE: f64 = 1e-13;
 
 /// Form factor of a fragment that is no more than the rounding between two blockers that share an edge. Dark rooms
 /// are exactly dark for it; nothing that could be seen through such a slit is lost.
-pub const SLIVER: f64 = 1e-14;
+pub const SLIVER: f64 = 1e-12;
 
 /// What a blocker hides from a point: a convex cone of directions.
 #[derive(Clone, Debug)]

@@ -173,6 +173,18 @@ impl Elements {
         (node.cell_max - node.cell_min).max_element()
     }
 
+    /// Divides all leaves whose cell is longer than `length`, metres, until none is.
+    pub fn divide_larger(&mut self, length: f64) {
+        let mut node = 0;
+        // New nodes come at the end, and are looked at in their turn.
+        while (node as usize) < self.nodes.len() {
+            if self.is_leaf(node) && self.cell_length(node) > length {
+                self.subdivide(node);
+            }
+            node += 1;
+        }
+    }
+
     /// Divides a leaf into four, or into two across its length if it is long; children that the patch leaves empty
     /// are omitted. Nothing happens to a node that has children already, and to clusters.
     pub fn subdivide(&mut self, node: NodeId) {

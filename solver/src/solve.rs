@@ -10,7 +10,11 @@ use crate::transport::{Transport, transport};
 use crate::{Elements, Solution, SolveOptions};
 
 /// Link error as a fraction of the scene's mean irradiance where none is asked for. Halving it doubles the elements.
-const RELATIVE_LINK_ERROR: f64 = 0.1;
+const RELATIVE_LINK_ERROR: f64 = 0.15;
+
+/// Largest side of an element, as a fraction of the scene's size. Links ask for no elements on a dark surface, but an eye
+/// that has adapted to it sees what one quadratic over all of it leaves out.
+const LARGEST_CELL: f64 = 0.1;
 
 /// Times that links are refined by the light of the transport before. The first has seen patches only, the second
 /// elements; later ones hardly change a link.
@@ -29,8 +33,12 @@ pub fn solve(scene: &Scene, options: &SolveOptions, progress: &(dyn Fn(f64) + Sy
     }
     let mut network = Network::of_patches(scene, Elements::new(&pieces), &first_patch, options.bounces == Some(0));
     progress(0.1);
-    let (mut links, mut first_link) = network.sorted_links();
-    let mut carried = transport(scene, &network.elements, &links, &first_link, options.bounces);
+    let transported = |network: &Network| {
+        let (links, first_link) = network.sorted_links();
+        let carried = transport(scene, &network.elements, &links, &first_link, options.bounces);
+        (links, first_link, carried)
+    };
+    let (.., mut carried) = transported(&network);
     let mean = mean_irradiance(&network.elements, &carried);
     let link_error = options.link_error.unwrap_or(RELATIVE_LINK_ERROR * luminance(mean));
     for pass in 0..REFINEMENTS {
@@ -40,9 +48,10 @@ pub fn solve(scene: &Scene, options: &SolveOptions, progress: &(dyn Fn(f64) + Sy
         if !refined {
             break;
         }
-        (links, first_link) = network.sorted_links();
-        carried = transport(scene, &network.elements, &links, &first_link, options.bounces);
+        (.., carried) = transported(&network);
     }
+    network.elements.divide_larger(scene.size() * LARGEST_CELL);
+    let (links, first_link, carried) = transported(&network);
     let (elements, blockers) = network.finish();
     let mean_irradiance = mean_irradiance(&elements, &carried);
     let mut solution = Solution {
