@@ -251,7 +251,7 @@ mod tests {
         baked.validate().unwrap();
         assert_eq!(statistics.mesh, MeshStatistics::default());
         assert_eq!(statistics.discontinuities_kept, baked.lines.len());
-        assert_eq!(baked.error.points, 3 * baked.triangles.len() as u64);
+        assert_eq!(baked.error.points, baked.triangles.len() as u64);
         for polygon in scene.polygon_ids() {
             let of_polygon = (0..baked.triangles.len() as u32)
                 .filter(|&triangle| baked.triangles[triangle as usize].polygon == polygon);
