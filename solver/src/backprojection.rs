@@ -287,7 +287,7 @@ mod tests {
         let point = vec![DVec3::Z * 0.5; 4];
         let line = vec![DVec3::new(-1., 0., 0.5), DVec3::new(0., 0., 0.5), DVec3::new(1., 0., 0.5)];
         for blocker in [edge_on, coplanar, point, line, Vec::new()] {
-            assert_eq!(visible(&source, &[blocker.clone()]), whole, "{blocker:?}");
+            assert_eq!(visible(&source, std::slice::from_ref(&blocker)), whole, "{blocker:?}");
         }
     }
 
