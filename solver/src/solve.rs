@@ -10,7 +10,7 @@ use crate::transport::{Transport, transport};
 use crate::{Elements, Solution, SolveOptions};
 
 /// Link error as a fraction of the scene's mean irradiance where none is asked for. Halving it doubles the elements.
-const RELATIVE_LINK_ERROR: f64 = 0.15;
+const RELATIVE_LINK_ERROR: f64 = 0.2;
 
 /// Largest side of an element, as a fraction of the scene's size. Links ask for no elements on a dark surface, but an eye
 /// that has adapted to it sees what one quadratic over all of it leaves out.
