@@ -20,8 +20,8 @@ pub struct BakeOptions {
     pub min_weight: Option<f64>,
 }
 
-/// w_min as a fraction of the luminance of the brightest emitter's radiosity where none is asked for. Twice as much
-/// leaves visible steps in penumbrae, half as much costs a third more triangles for a tenth less error.
+/// w_min as a fraction of the luminance of the brightest emitter's radiosity where none is asked for. Three times as much
+/// costs the office a third more error; a third of it a third more triangles, and gains next to nothing.
 const RELATIVE_MIN_WEIGHT: f64 = 0.4;
 
 impl Default for BakeOptions {

@@ -19,7 +19,7 @@ use crate::solution::{ElementLight, Solution};
 use crate::{LinkSource, NodeId};
 
 /// How much light a reflector's linear elements may misplace at a point before finer ones are opened, as a fraction
-/// of the scene's mean irradiance. Per source and point; smaller is slower in proportion to its square root.
+/// of the scene's mean irradiance. Per source and point; smaller opens more elements at every point.
 const SOURCE_BUDGET: f64 = 6e-3;
 
 /// How other polygons touch a point of a polygon: how many values irradiance has there.

@@ -9,7 +9,8 @@ use crate::refine::{Network, SourceLight};
 use crate::transport::{Transport, transport};
 use crate::{Elements, Solution, SolveOptions};
 
-/// Link error as a fraction of the scene's mean irradiance where none is asked for. Halving it doubles the elements.
+/// Link error as a fraction of the scene's mean irradiance where none is asked for. Half of it costs the
+/// office half as many elements again.
 const RELATIVE_LINK_ERROR: f64 = 0.2;
 
 /// Largest side of an element, as a fraction of the scene's size. Links ask for no elements on a dark surface, but an eye
