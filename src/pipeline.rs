@@ -1,6 +1,6 @@
 //! Scene → Solution → Baked, with the counts and seconds of every stage.
 
-use mesher::BakeOptions;
+use mesher::{BakeOptions, Control};
 use scene::{Baked, BakedError, Provenance, Scene};
 use serde::Serialize;
 use solver::{Solution, SolveOptions};
@@ -22,18 +22,23 @@ pub fn solve(scene: &Scene, flags: &LightFlags) -> (Solution, f64) {
 /// Bakes a scene.
 pub fn bake(scene: &Scene, flags: &LightFlags) -> (Baked, BakeReport) {
     let (solution, solve_seconds) = solve(scene, flags);
+    let links = solution.links.len();
     let stage = Stage::start("mesh");
+    let defaults = BakeOptions::default();
     let options = BakeOptions {
-        discontinuities: flags.discontinuities.unwrap_or(BakeOptions::default().discontinuities),
+        tolerance: flags.tolerance,
+        discontinuities: flags.discontinuities.unwrap_or(defaults.discontinuities),
         min_weight: flags.min_weight,
+        ..defaults
     };
-    let (mut baked, statistics) = mesher::bake(scene, &solution, &options, &|fraction| stage.advance(fraction));
+    let control = Control { progress: &|fraction| stage.advance(fraction), stop: &|| false };
+    let mesher::Bake { mut baked, solution, statistics } = mesher::bake(scene, solution, &options, control);
     let mesh_seconds = stage.end();
     let report = BakeReport {
         polygons: scene.polygons.len(),
         patches: solution.elements.patches.len(),
         elements: solution.elements.leaves().count(),
-        links: solution.links.len(),
+        links,
         link_bytes: size_of_val(solution.links.as_slice()),
         blockers: solution.blockers.polygons.len(),
         blocker_bytes: solution.blockers.bytes(),
@@ -44,6 +49,8 @@ pub fn bake(scene: &Scene, flags: &LightFlags) -> (Baked, BakeReport) {
         discontinuities_kept: statistics.discontinuities_kept,
         triangles: baked.triangles.len(),
         samples: baked.samples.len(),
+        rows: statistics.rows,
+        rounds: statistics.rounds,
         error: baked.error.into(),
         seconds: Seconds { solve: solve_seconds, mesh: mesh_seconds, ..Seconds::default() },
         peak_memory_bytes: None,
@@ -60,6 +67,7 @@ fn provenance(solution: &Solution, options: &BakeOptions, report: &BakeReport, m
     Provenance {
         program: PROGRAM.to_owned(),
         options: vec![
+            option("tolerance", options.tolerance.to_string()),
             option(BOUNCES, bounces),
             option(LINK_ERROR, solution.link_error.to_string()),
             option("discontinuities", options.discontinuities.to_string()),
@@ -120,7 +128,11 @@ pub struct BakeReport {
     pub triangles: usize,
     /// Irradiance samples, each evaluated once.
     pub samples: usize,
-    /// Errors measured at probe points, relative to max(own, mean) irradiance.
+    /// Points at which reflectors were looked at.
+    pub rows: usize,
+    /// Rounds of meshing and measurement.
+    pub rounds: u32,
+    /// Errors as they were measured, relative to max(own, mean) irradiance.
     pub error: ErrorReport,
     /// Seconds by stage.
     pub seconds: Seconds,
@@ -139,11 +151,13 @@ pub struct ErrorReport {
     pub max: f64,
     /// Number of points compared.
     pub points: u64,
+    /// Whether the tolerance is kept.
+    pub holds: bool,
 }
 
 impl From<BakedError> for ErrorReport {
-    fn from(BakedError { rms, p99, max, points }: BakedError) -> Self {
-        Self { rms, p99, max, points }
+    fn from(BakedError { rms, p99, max, points, holds }: BakedError) -> Self {
+        Self { rms, p99, max, points, holds }
     }
 }
 

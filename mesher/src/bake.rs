@@ -1,39 +1,108 @@
-//! Solution → Baked: the stages of this crate, one after another.
+//! Solution → Baked: rounds of meshing, exchange of light and measurement until the bake keeps its tolerance.
+//!
+//! A round divides the leaves on which light from emitters is interpolated badly (`fine_mesh`), then those on which light over
+//! reflectors is (`reflected_light`), and then measures the whole (`residual`). Where that misses the tolerance, the next round
+//! asks both for less. Rounds are global: what is divided depends on the light alone, never on threads.
 
 use glam::Vec3;
 use rayon::prelude::*;
-use scene::{Baked, BakedElement, BakedTriangle, DiscontinuityLine, HalfEdges, Provenance, Scene, luminance};
-use solver::{Gather, Solution};
+use scene::{Baked, BakedElement, BakedError, BakedTriangle, HalfEdges, Provenance, Rgb, Scene, luminance};
+use solver::{NodeId, Solution};
 
-use crate::{
-    Discontinuity, Leaf, LeafSegment, Mesh, MeshStatistics, Progress, RankedLine, SampleQuery, discontinuities,
-    edge_table, evaluate_samples, leaf_meshes, probe, rank, sample_table,
-};
+use crate::fine_mesh::FineMesh;
+use crate::probe::{colour_mean, percentile};
+use crate::refinement::worst;
+use crate::reflected_light::{Exchange, ReflectedLight};
+use crate::residual::{ResidualPoint, residual};
+use crate::{Discontinuity, Leaf, Mesh, MeshStatistics, Progress, discontinuities};
 
 /// What a bake is asked for.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BakeOptions {
+    /// Relative root mean square error of irradiance that is accepted, and a fifth of the error that is accepted at 99 % of
+    /// the area; 0..1.
+    pub tolerance: f64,
     /// Discontinuities that a leaf follows at most (k of Hardt & Teller 1996, section 4.2).
     pub discontinuities: u32,
     /// Weight below which a discontinuity is not followed, W·m⁻² (w_min). None takes a fraction of the radiosity of the
     /// brightest emitter.
     pub min_weight: Option<f64>,
+    /// With more triangles than this a bake is not refined further; the last one with fewer is kept if there is one.
+    pub max_triangles: usize,
 }
 
-/// w_min as a fraction of the luminance of the brightest emitter's radiosity where none is asked for. Three times as much
-/// costs the office a third more error; a third of it a third more triangles, and gains next to nothing.
+/// w_min as a fraction of the luminance of the brightest emitter's radiosity at a tolerance of 1 % where none is asked for.
+/// Three times as much costs the office a third more error; a third of it a third more triangles, and gains next to nothing.
 const RELATIVE_MIN_WEIGHT: f64 = 0.4;
 
+/// The share of the tolerance that the interpolation of emitters' light, and as much again that of reflectors' light, may use
+/// up in the first round, as probes see it. Probes miss what lies between them, and the sum of bounces what each is off by:
+/// with more a first round seldom does, with less it takes leaves that nobody asked for.
+const FIRST_SHARE: f64 = 0.34;
+
+/// What the error is aimed at where a round has missed the tolerance, as a part of the tolerance; and by how much a share
+/// shrinks for it at most and at least. Less divides too much, more asks for one round more.
+const NEXT_AIM: f64 = 0.85;
+const NEXT_SHARE: [f64; 2] = [0.5, 0.9];
+
+/// Of the error that is allowed, as much is aimed at when leaves are chosen: their parts keep some of it.
+const AIM: f64 = 0.6;
+
+/// Meshes in one round at most. Each divides what the last one found wanting.
+const MESHES: u32 = 12;
+
+/// What a round must bring the error down to, as a part of the last one's, for another to be worth its time.
+const WORTHWHILE: f64 = 0.95;
+
+/// Rounds at most: by then a share is a twentieth of the tolerance, and the fault lies elsewhere.
+const ROUNDS: u32 = 5;
+
+/// Leaves with a cell shorter than this fraction of the scene's size are not divided: at a corner of contact the error falls
+/// no faster than its area.
+const SMALLEST_LEAF: f64 = 1e-3;
+
+/// Length of the elements that light over reflectors is found on first, as a fraction of the scene's size. Longer ones miss
+/// what lies between their probes, shorter ones cost more than a room needs.
+const FRONT_LENGTH: f64 = 0.1;
+
+/// The part of [`BakeOptions::tolerance`] that a row may misplace on account of each reflector.
+const SOURCE_SHARE: f64 = 0.1;
+
+/// The part of the tolerance, relative to the scene's mean irradiance, by which the last exchange may still change a sample.
+const RESIDUAL_SHARE: f64 = 0.02;
+
 impl Default for BakeOptions {
-    /// The paper's k.
+    /// One percent, and the paper's k.
     fn default() -> Self {
-        Self { discontinuities: 10, min_weight: None }
+        Self { tolerance: 0.01, discontinuities: 10, min_weight: None, max_triangles: usize::MAX }
     }
+}
+
+/// What is told of a bake while it is made, and asked.
+#[derive(Clone, Copy)]
+pub struct Control<'a> {
+    /// Is told the fraction that is done.
+    pub progress: Progress<'a>,
+    /// Whether to stop with the best bake so far: asked between rounds.
+    pub stop: &'a (dyn Fn() -> bool + Sync),
+}
+
+/// A bake, the solution as it was refined for it, and counts.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Bake {
+    /// The bake; its provenance is left empty.
+    pub baked: Baked,
+    /// The solution with the elements and the light of the bake.
+    pub solution: Solution,
+    /// Counts.
+    pub statistics: BakeStatistics,
 }
 
 /// Counts of a bake.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct BakeStatistics {
+    /// Rounds of meshing and measurement.
+    pub rounds: u32,
     /// The least weight that was used, W·m⁻².
     pub min_weight: f64,
     /// Discontinuities of at least the least weight, over all polygons.
@@ -46,69 +115,243 @@ pub struct BakeStatistics {
     pub triangles: usize,
     /// Samples, each evaluated once.
     pub samples: usize,
+    /// Points at which reflectors were looked at.
+    pub rows: usize,
     /// What the triangulation could not do as planned.
     pub mesh: MeshStatistics,
 }
 
-/// The share of the work that the progress gives to all that comes before the samples. With interreflection it is less,
-/// with direct light alone more.
-const MESH_SHARE: f64 = 0.05;
-
-/// Bakes a solved scene. The provenance is left empty.
-pub fn bake(
-    scene: &Scene,
-    solution: &Solution,
-    options: &BakeOptions,
-    progress: Progress<'_>,
-) -> (Baked, BakeStatistics) {
-    progress(0.0);
+/// Bakes a solved scene.
+pub fn bake(scene: &Scene, solution: Solution, options: &BakeOptions, control: Control<'_>) -> Bake {
     let brightest = || scene.emitters().map(|e| luminance(scene.material(e).exitance())).fold(0.0, f64::max);
-    let min_weight = options.min_weight.unwrap_or_else(|| RELATIVE_MIN_WEIGHT * brightest());
-    let found = all_discontinuities(scene, solution, min_weight);
-    let (leaves, lines) = divided_leaves(scene, solution, &found, options.discontinuities as usize);
-    let mesh = leaf_meshes(&edge_table(scene, &solution.cuts, &leaves));
-
-    let gather = Gather::new(scene, solution);
-    let evaluate = |queries: &[SampleQuery]| {
-        let Some(first) = queries.first() else { return Vec::new() };
-        let leaf = gather.over(first.element);
-        queries.iter().map(|query| leaf.irradiance(query.position, query.inward)).collect()
+    let relative = RELATIVE_MIN_WEIGHT * options.tolerance / BakeOptions::default().tolerance;
+    let min_weight = options.min_weight.unwrap_or_else(|| relative * brightest());
+    (control.progress)(0.0);
+    let found = all_discontinuities(scene, &solution, min_weight);
+    let mut rounds = Rounds {
+        scene,
+        options,
+        reflected: ReflectedLight::new(&solution, FRONT_LENGTH * scene.size()),
+        mean: colour_mean(solution.mean_irradiance),
+        solution,
+        found,
+        share: FIRST_SHARE,
     };
-    let table = sample_table(scene, &leaves, &mesh, &|polygon, position| gather.contact(polygon, position));
-    let (to_sample, to_probe) = (table.queries.len() as f64, mesh.triangles.len() as f64);
-    let sampling = (1.0 - MESH_SHARE) * to_sample / (to_sample + to_probe).max(1.0);
-    let stage = |from: f64, to: f64| move |part: f64| progress(from + (to - from) * part);
-    let values = evaluate_samples(&table.queries, &evaluate, &stage(MESH_SHARE, MESH_SHARE + sampling));
-    let samples: Vec<Vec3> = values.iter().map(|value| value.as_vec3()).collect();
-    let probes = probe(&leaves, &mesh, &table, &samples, &evaluate, &stage(MESH_SHARE + sampling, 1.0));
-    progress(1.0);
-
-    let (vertices, triangles) = stored_triangles(&leaves, &mesh, &table.triangles);
+    let reflectance = mean_reflectance(scene, &rounds.solution);
+    let mut statistics = BakeStatistics { min_weight, ..BakeStatistics::default() };
+    let mut best: Option<(FineMesh, Vec<Rgb>, BakedError)> = None;
+    let (fine, samples, error) = loop {
+        let fine = rounds.mesh();
+        let samples = rounds.samples(&fine);
+        let reflecting = &rounds.reflected.reflecting;
+        let points = residual(scene, &rounds.solution, &fine, &samples, reflecting, options.tolerance);
+        let error = measured(&points, options.tolerance, reflectance);
+        statistics.rounds += 1;
+        let too_many = fine.triangles() > options.max_triangles;
+        if too_many && let Some(best) = best {
+            break best;
+        }
+        let missed = |error: &BakedError| (error.rms / options.tolerance).max(error.p99 / (P99 * options.tolerance));
+        // What finer leaves do not mend is not theirs to mend.
+        let stalls = best.as_ref().is_some_and(|best| missed(&error) > WORTHWHILE * missed(&best.2));
+        if error.holds || too_many || stalls || statistics.rounds == ROUNDS || (control.stop)() {
+            break (fine, samples, error);
+        }
+        rounds.share *= (NEXT_AIM / missed(&error)).clamp(NEXT_SHARE[0], NEXT_SHARE[1]);
+        (control.progress)(1.0 - 0.5f64.powi(statistics.rounds as i32));
+        best = Some((fine, samples, error));
+    };
+    (control.progress)(1.0);
+    let samples: Vec<Vec3> = samples.iter().map(|value| value.max(Rgb::ZERO).as_vec3()).collect();
+    let (vertices, triangles) = stored_triangles(&fine.leaves, &fine.mesh, &fine.table.triangles);
     let statistics = BakeStatistics {
-        min_weight,
-        discontinuities_found: found.iter().map(Vec::len).sum(),
-        discontinuities_kept: lines.len(),
+        discontinuities_found: rounds.found.iter().map(Vec::len).sum(),
+        discontinuities_kept: fine.lines.len(),
         vertices: vertices.len(),
         triangles: triangles.len(),
         samples: samples.len(),
-        mesh: mesh.statistics,
+        rows: rounds.reflected.rows(),
+        mesh: fine.mesh.statistics,
+        ..statistics
     };
     let element = |leaf: &Leaf| BakedElement {
         polygon: leaf.polygon,
-        irradiance: solution.irradiance[leaf.element as usize].irradiance.as_vec3(),
+        irradiance: rounds.solution.light[leaf.element as usize].irradiance.as_vec3(),
     };
     let baked = Baked {
         scene: scene.clone(),
         vertices,
         samples,
+        triangle_errors: vec![0.0; triangles.len()],
         triangles,
-        triangle_errors: probes.triangle_errors,
-        elements: leaves.iter().map(element).collect(),
-        lines,
-        error: probes.error,
+        elements: fine.leaves.iter().map(element).collect(),
+        lines: fine.lines,
+        error,
         provenance: Provenance::default(),
     };
-    (baked, statistics)
+    Bake { baked, solution: rounds.solution, statistics }
+}
+
+/// What goes from round to round.
+struct Rounds<'a> {
+    scene: &'a Scene,
+    options: &'a BakeOptions,
+    solution: Solution,
+    found: Vec<Vec<Discontinuity>>,
+    reflected: ReflectedLight,
+    /// Mean irradiance of all surfaces, averaged over the colours, W·m⁻².
+    mean: f64,
+    /// The share of the tolerance that each of the two kinds of light may use up in this round.
+    share: f64,
+}
+
+impl Rounds<'_> {
+    /// One round: divides leaves until both kinds of light are interpolated well enough; the mesh of the last division.
+    fn mesh(&mut self) -> FineMesh {
+        let mut fine = self.mesh_emitted();
+        if !self.solution.reflects() {
+            return fine;
+        }
+        for _ in 0..MESHES {
+            let exchange = Exchange {
+                source_error: SOURCE_SHARE * self.options.tolerance,
+                residual: RESIDUAL_SHARE * self.options.tolerance * self.mean,
+            };
+            self.reflected.solve(self.scene, &mut self.solution, &fine, &exchange);
+            let errors = self.reflected.leaf_errors(self.scene, &self.solution, &exchange);
+            let leaves: Vec<(NodeId, f64)> = errors
+                .iter()
+                .map(|error| {
+                    let own = error.irradiance + colour_mean(self.solution.direct[error.element as usize].irradiance);
+                    (error.element, error.error / own.max(self.mean))
+                })
+                .collect();
+            let divided = self.wanting(&leaves);
+            if divided.is_empty() || fine.triangles() > self.options.max_triangles {
+                break;
+            }
+            if self.reflected.refine(&mut self.solution, &divided) {
+                fine = FineMesh::new(self.scene, &self.solution, &self.found, self.options.discontinuities as usize);
+            }
+        }
+        fine
+    }
+
+    /// Irradiance at the samples of a mesh, W·m⁻².
+    fn samples(&self, fine: &FineMesh) -> Vec<Rgb> {
+        if self.solution.reflects() { self.reflected.irradiance(&self.solution, fine) } else { fine.emitted.clone() }
+    }
+
+    /// Divides leaves until light from emitters is interpolated well enough.
+    fn mesh_emitted(&mut self) -> FineMesh {
+        let count = self.options.discontinuities as usize;
+        let mut fine = FineMesh::new(self.scene, &self.solution, &self.found, count);
+        for _ in 0..MESHES {
+            let mut leaves: Vec<(NodeId, f64)> = fine.leaves.iter().map(|leaf| (leaf.element, 0.0)).collect();
+            for (triangle, (error, emitted)) in fine.probe_emitted(self.scene, &self.solution).into_iter().enumerate() {
+                let leaf = fine.mesh.triangles[triangle].leaf as usize;
+                let element = leaves[leaf].0;
+                let own = emitted + colour_mean(self.solution.reflected_over_links(element, glam::DVec2::ZERO));
+                let part = scene::area_vector(&fine.corners(triangle)).length()
+                    / self.solution.elements.nodes[element as usize].area;
+                leaves[leaf].1 += part * (error / own.max(self.mean)).powi(2);
+            }
+            leaves.iter_mut().for_each(|leaf| leaf.1 = leaf.1.sqrt());
+            let divided = self.wanting(&leaves);
+            if divided.is_empty() || fine.triangles() > self.options.max_triangles {
+                break;
+            }
+            for leaf in divided {
+                self.solution.subdivide(leaf);
+            }
+            fine = FineMesh::new(self.scene, &self.solution, &self.found, count);
+        }
+        fine
+    }
+
+    /// Of elements with their relative errors, those that are to be divided so that this round's share is kept; ascending.
+    fn wanting(&self, leaves: &[(NodeId, f64)]) -> Vec<NodeId> {
+        let elements = &self.solution.elements;
+        let area = |leaf: NodeId| elements.nodes[leaf as usize].area;
+        let total: f64 = leaves.iter().map(|&(leaf, _)| area(leaf)).sum();
+        let allowed = (self.share * self.options.tolerance).powi(2) * total;
+        let smallest = SMALLEST_LEAF * self.scene.size();
+        let weighted: Vec<f64> = leaves
+            .iter()
+            .map(|&(leaf, error)| {
+                let divides = elements.cell_length(leaf) > smallest && error.is_finite();
+                if divides { error * error * area(leaf) } else { 0.0 }
+            })
+            .collect();
+        if weighted.iter().sum::<f64>() <= allowed {
+            return Vec::new();
+        }
+        let mut divided: Vec<NodeId> = worst(&weighted, AIM * allowed).into_iter().map(|i| leaves[i].0).collect();
+        divided.sort_unstable();
+        divided
+    }
+}
+
+/// The error that is accepted at 99 % of the area, in tolerances.
+const P99: f64 = 5.0;
+
+/// One-sided 99 % of the normal distribution.
+const CONFIDENCE: f64 = 2.326;
+
+/// The error of a bake by its residual at points spread evenly by area, each relative to max(own, mean) irradiance.
+/// `reflectance` is the part of all light that is reflected.
+fn measured(points: &[ResidualPoint], tolerance: f64, reflectance: f64) -> BakedError {
+    let count = points.len() as f64;
+    if points.is_empty() {
+        return BakedError { holds: true, ..BakedError::default() };
+    }
+    let mean = points.iter().map(|point| point.irradiance).sum::<f64>() / count;
+    let scale = |point: &ResidualPoint| point.irradiance.max(mean).max(f64::MIN_POSITIVE);
+    let product = |point: &ResidualPoint| {
+        let [a, b] = point.differences;
+        colour_mean(a * b) / scale(point).powi(2)
+    };
+    let mean_square = points.iter().map(product).sum::<f64>() / count;
+    // What the residual is off by on average is reflected again and again: the bake is off by the sum of it.
+    let bias = points.iter().map(|point| colour_mean(point.differences[0] + point.differences[1]) / 2.0 / scale(point));
+    let bias = bias.sum::<f64>() / count;
+    let amplified = (bias / (1.0 - reflectance.min(LARGEST_REFLECTANCE))).powi(2) - bias * bias;
+    let scatter = points.iter().map(|point| (product(point) - mean_square).powi(2)).sum::<f64>() / count;
+    let limit = mean_square + CONFIDENCE * (scatter / count).sqrt();
+    let errors: Vec<f64> = points
+        .iter()
+        .map(|point| {
+            let difference = (point.differences[0] + point.differences[1]) / 2.0;
+            colour_mean(difference * difference).sqrt() / scale(point)
+        })
+        .collect();
+    let p99 = percentile(&errors, &vec![1.0; errors.len()], 0.99);
+    let rms = (limit.max(0.0) + amplified).sqrt();
+    BakedError {
+        rms,
+        p99,
+        max: errors.iter().copied().fold(0.0, f64::max),
+        points: points.len() as u64,
+        holds: rms <= tolerance && p99 <= P99 * tolerance,
+    }
+}
+
+/// Reflectance that a mean is taken for at most: beyond it nothing can be said by a sum.
+const LARGEST_REFLECTANCE: f64 = 0.95;
+
+/// The part of the light on all surfaces that they reflect, 0..=1.
+fn mean_reflectance(scene: &Scene, solution: &Solution) -> f64 {
+    if !solution.reflects() {
+        return 0.0;
+    }
+    let (mut arrives, mut leaves) = (0.0, 0.0);
+    for leaf in solution.elements.leaves() {
+        let Some(polygon) = solution.elements.polygon_of(leaf) else { continue };
+        let irradiance = solution.irradiance[leaf as usize].irradiance * solution.elements.nodes[leaf as usize].area;
+        arrives += colour_mean(irradiance);
+        leaves += colour_mean(irradiance * scene.material(polygon).reflectance);
+    }
+    if arrives > 0.0 { leaves / arrives } else { 0.0 }
 }
 
 /// The discontinuities on every polygon.
@@ -122,52 +365,6 @@ fn all_discontinuities(scene: &Scene, solution: &Solution, min_weight: f64) -> V
             discontinuities(scene, &half_edges, receiver, &interactions, min_weight)
         })
         .collect()
-}
-
-/// All leaves with the `count` strongest discontinuities of each, and the lines that these are parts of.
-fn divided_leaves(
-    scene: &Scene,
-    solution: &Solution,
-    found: &[Vec<Discontinuity>],
-    count: usize,
-) -> (Vec<Leaf>, Vec<DiscontinuityLine>) {
-    let elements = &solution.elements;
-    let mut leaves: Vec<Leaf> = scene
-        .polygon_ids()
-        .flat_map(|polygon| solution.leaves_of(polygon).into_iter().map(move |element| (polygon, element)))
-        .collect::<Vec<_>>()
-        .into_par_iter()
-        .map(|(polygon, element)| {
-            let outline = elements.outline(element);
-            let ranked = rank(scene, outline, &found[polygon as usize], count);
-            let segment = |line: RankedLine| LeafSegment { ends: line.ends, line: line.discontinuity };
-            let segments = ranked.into_iter().map(segment).collect();
-            Leaf { element, polygon, outline: outline.to_vec(), segments }
-        })
-        .collect();
-
-    // Until here a segment names its line by its place on the polygon; now the lines that are kept are numbered.
-    let mut kept: Vec<(u32, u32)> =
-        leaves.iter().flat_map(|leaf| leaf.segments.iter().map(|segment| (leaf.polygon, segment.line))).collect();
-    kept.sort_unstable();
-    kept.dedup();
-    for leaf in &mut leaves {
-        for segment in &mut leaf.segments {
-            segment.line = kept.partition_point(|&line| line < (leaf.polygon, segment.line)) as u32;
-        }
-    }
-    let stored = |&(polygon, line): &(u32, u32)| {
-        let line = &found[polygon as usize][line as usize];
-        DiscontinuityLine {
-            kind: line.kind,
-            receiver: line.receiver,
-            source: line.source,
-            blocker: line.blocker,
-            weight: line.weight as f32,
-            ends: line.ends.map(|end| end.as_vec3()),
-        }
-    };
-    (leaves, kept.iter().map(stored).collect())
 }
 
 /// The mesh as it is stored: without the vertices that no triangle uses.
@@ -233,25 +430,34 @@ mod tests {
         scene
     }
 
+    /// The direct light of a scene.
     fn baked(scene: &Scene, options: &BakeOptions) -> (Baked, BakeStatistics) {
-        let direct = SolveOptions { link_error: None, bounces: Some(0) };
-        bake(scene, &solve(scene, &direct, &|_| ()), options, &|fraction| assert!((0.0..=1.0).contains(&fraction)))
+        baked_with(scene, options, Some(0))
+    }
+
+    fn baked_with(scene: &Scene, options: &BakeOptions, bounces: Option<u32>) -> (Baked, BakeStatistics) {
+        let solution = solve(scene, &SolveOptions { bounces, ..SolveOptions::default() }, &|_| ());
+        let progress = |fraction| assert!((0.0..=1.0).contains(&fraction));
+        let bake = bake(scene, solution, options, Control { progress: &progress, stop: &|| false });
+        (bake.baked, bake.statistics)
     }
 
     #[test]
     fn an_empty_scene_bakes_to_nothing() {
         let (baked, statistics) = baked(&Scene::default(), &BakeOptions::default());
-        assert_eq!((baked, statistics), (Baked::default(), BakeStatistics::default()));
+        let error = BakedError { holds: true, ..BakedError::default() };
+        assert_eq!(baked, Baked { error, ..Baked::default() });
+        assert_eq!((statistics.triangles, statistics.samples, statistics.rounds), (0, 0, 1));
     }
 
     #[test]
     fn triangles_fill_every_polygon_and_all_is_in_range() {
         let scene = floor_lamp_and_plate();
-        let (baked, statistics) = baked(&scene, &BakeOptions { discontinuities: 10, min_weight: Some(1.0) });
+        let (baked, statistics) = baked(&scene, &BakeOptions { min_weight: Some(1.0), ..BakeOptions::default() });
         baked.validate().unwrap();
         assert_eq!(statistics.mesh, MeshStatistics::default());
         assert_eq!(statistics.discontinuities_kept, baked.lines.len());
-        assert_eq!(baked.error.points, baked.triangles.len() as u64);
+        assert!(baked.error.holds && baked.error.points > 0);
         for polygon in scene.polygon_ids() {
             let of_polygon = (0..baked.triangles.len() as u32)
                 .filter(|&triangle| baked.triangles[triangle as usize].polygon == polygon);
@@ -261,12 +467,35 @@ mod tests {
     }
 
     #[test]
-    fn following_discontinuities_lowers_the_error() {
+    fn following_discontinuities_saves_triangles() {
         let scene = floor_lamp_and_plate();
-        let error =
-            |discontinuities| baked(&scene, &BakeOptions { discontinuities, min_weight: Some(1.0) }).0.error.rms;
-        let (none, all) = (error(0), error(20));
-        assert!(all < 0.5 * none, "{all} of {none}");
+        let triangles = |discontinuities| {
+            let options =
+                BakeOptions { tolerance: 1e-3, discontinuities, min_weight: Some(1.0), ..BakeOptions::default() };
+            let (baked, statistics) = baked(&scene, &options);
+            assert!(baked.error.holds);
+            statistics.triangles
+        };
+        let (none, all) = (triangles(0), triangles(20));
+        assert!(all * 2 < none, "{all} of {none}");
+    }
+
+    #[test]
+    fn the_error_falls_with_the_tolerance() {
+        let scene = floor_lamp_and_plate();
+        let error = |tolerance| baked(&scene, &BakeOptions { tolerance, ..BakeOptions::default() }).0.error.rms;
+        let errors = [0.03, 0.003, 3e-4].map(error);
+        assert!(errors.windows(2).all(|pair| pair[1] < pair[0]), "{errors:?}");
+        assert!(errors[2] <= 3e-4);
+    }
+
+    #[test]
+    fn too_few_triangles_are_said_to_miss() {
+        let scene = floor_lamp_and_plate();
+        let options = BakeOptions { tolerance: 1e-3, max_triangles: 100, ..BakeOptions::default() };
+        let (baked, _) = baked(&scene, &options);
+        assert!(!baked.error.holds && baked.error.rms > 1e-3);
+        baked.validate().unwrap();
     }
 
     #[test]
@@ -274,7 +503,7 @@ mod tests {
         let scene = floor_lamp_and_plate();
         let run = |threads: usize| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-            pool.install(|| baked(&scene, &BakeOptions::default()))
+            pool.install(|| baked_with(&scene, &BakeOptions { tolerance: 0.05, ..BakeOptions::default() }, None))
         };
         assert!(run(1) == run(3));
     }

@@ -6,21 +6,25 @@ mod critical_surface;
 mod discontinuity;
 mod edge_table;
 mod facet;
+mod fine_mesh;
 mod frame;
 mod interval;
 mod leaf_mesh;
 mod probe;
+mod projection;
 mod ranking;
+mod refinement;
+mod reflected_light;
+mod residual;
 mod samples;
 #[cfg(test)]
 mod testing;
 mod weld;
 
-pub use bake::{BakeOptions, BakeStatistics, bake};
+pub use bake::{Bake, BakeOptions, BakeStatistics, Control, bake};
 pub use critical_surface::GrazingRay;
 pub use discontinuity::{Discontinuity, discontinuities};
 pub use edge_table::{EdgeTable, Leaf, LeafSegment, edge_table};
 pub use leaf_mesh::{Mesh, MeshStatistics, MeshTriangle, leaf_meshes};
-pub use probe::{Probes, probe};
 pub use ranking::{RankedLine, rank};
 pub use samples::{Evaluate, Progress, SampleQuery, SampleTable, evaluate_samples, sample_table};

@@ -23,8 +23,8 @@ pub struct SampleQuery {
     pub polygon: u32,
     /// An element (the solver's node) whose closure contains the position.
     pub element: u32,
-    /// Unit direction in the polygon's plane towards the middle of the triangle that asks: where the value depends on
-    /// the direction of approach, the limit is taken from there.
+    /// Where the value depends on the direction of approach, the unit direction in the polygon's plane that the limit is
+    /// taken from: across a line of contact, to the middle of the triangle that asks at a corner of contact. Zero elsewhere.
     pub inward: DVec3,
 }
 
@@ -92,13 +92,13 @@ pub fn sample_table(
         let samples = stations(triangle.vertices).map(|station| {
             let position = position(station);
             let inward = (middle - position).normalize_or_zero();
-            let side = match contact_at(polygon, station) {
-                Contact::None => Side::Any,
+            let (side, inward) = match contact_at(polygon, station) {
+                Contact::None => (Side::Any, DVec3::ZERO),
                 Contact::Line { direction } => {
                     let to_left = normals[polygon as usize].cross(direction);
-                    if inward.dot(to_left) >= 0.0 { Side::Left } else { Side::Right }
+                    if inward.dot(to_left) >= 0.0 { (Side::Left, to_left) } else { (Side::Right, -to_left) }
                 }
-                Contact::Corner => Side::Of(id),
+                Contact::Corner => (Side::Of(id), inward),
             };
             *known.entry((polygon, station, side)).or_insert_with(|| {
                 table.queries.push(SampleQuery { position, polygon, element, inward });
@@ -199,8 +199,9 @@ mod tests {
         let table = sample_table(&scene, &leaves, &mesh, &wall);
         for (triangle, samples) in mesh.triangles.iter().zip(&table.triangles) {
             for query in samples.map(|sample| table.queries[sample as usize]) {
-                assert!((query.inward.length() - 1.0).abs() < 1e-12);
-                if query.position.y == 0.5 {
+                if query.position.y != 0.5 {
+                    assert_eq!(query.inward, DVec3::ZERO);
+                } else {
                     // The limit is taken from the triangle's own side, and asked of a leaf on that side.
                     assert_eq!(query.inward.y > 0.0, triangle.leaf == 1);
                     assert_eq!(query.element, leaves[triangle.leaf as usize].element);

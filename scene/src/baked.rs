@@ -97,10 +97,10 @@ pub struct DiscontinuityLine {
     pub ends: [Vec3; 2],
 }
 
-/// Errors of the interpolants at points that they were not fitted to, each relative to max(own, mean) irradiance.
+/// Errors of a bake as it was measured when it was made, each relative to max(own, mean) irradiance.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct BakedError {
-    /// Root of the area-weighted mean square.
+    /// Root of the area-weighted mean square: the upper limit of the measurement at 99 % confidence.
     pub rms: f64,
     /// 99th percentile by area.
     pub p99: f64,
@@ -108,6 +108,8 @@ pub struct BakedError {
     pub max: f64,
     /// Number of points compared.
     pub points: u64,
+    /// Whether the tolerance that was asked for is kept.
+    pub holds: bool,
 }
 
 /// What made a bake. No times, no paths, no thread counts: the same input gives the same bytes.

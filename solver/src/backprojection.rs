@@ -67,7 +67,7 @@ impl BlockerCone {
     }
 
     /// The cone over corners given relative to the point, in either orientation. None where it has no solid angle.
-    fn new(corners: Vec<DVec3>) -> Option<Self> {
+    pub fn new(corners: Vec<DVec3>) -> Option<Self> {
         // Unit vectors: the length of their cross product is the sine of an edge's angle, free of scale.
         let mut corners = corners;
         corners.iter_mut().for_each(|corner| *corner = corner.normalize_or_zero());

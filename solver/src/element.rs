@@ -100,6 +100,24 @@ impl Elements {
         (0..self.nodes.len() as u32).filter(|&node| self.is_leaf(node))
     }
 
+    /// A node, its parent, and so on up to the root.
+    pub fn ancestors(&self, node: NodeId) -> impl Iterator<Item = NodeId> {
+        std::iter::successors(Some(node), |&node| {
+            let parent = self.nodes[node as usize].parent;
+            (parent != node).then_some(parent)
+        })
+    }
+
+    /// All nodes below a node, parents before their children.
+    pub fn descendants(&self, node: NodeId) -> impl Iterator<Item = NodeId> {
+        let mut open: Vec<NodeId> = self.children(node).rev().collect();
+        std::iter::from_fn(move || {
+            let node = open.pop()?;
+            open.extend(self.children(node).rev());
+            Some(node)
+        })
+    }
+
     /// The patch of a surface node; none for a cluster.
     pub fn patch_of(&self, node: NodeId) -> Option<u32> {
         match self.nodes[node as usize].kind {
@@ -251,8 +269,17 @@ impl Patch {
 
     /// Coordinates of a position in the patch's frame, metres.
     pub fn coordinates(&self, position: DVec3) -> DVec2 {
-        let offset = position - self.origin;
+        self.along(position - self.origin)
+    }
+
+    /// Components of an offset along u and v, metres.
+    pub fn along(&self, offset: DVec3) -> DVec2 {
         DVec2::new(self.u.dot(offset), self.v.dot(offset))
+    }
+
+    /// Unit normal, to the front.
+    pub fn normal(&self) -> DVec3 {
+        self.u.cross(self.v)
     }
 }
 

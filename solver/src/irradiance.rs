@@ -7,20 +7,21 @@
 //!
 //! What we do differently: blockers in contact with the point enter by their limit ([`Viewpoint::tangent_cone`]).
 
+use std::cell::OnceCell;
+
 use glam::DVec3;
 use scene::{Rgb, Scene, luminance};
 
-use crate::backprojection::{BlockerCone, Fragments, SLIVER, Viewpoint};
-use crate::blocker::Blocker;
-use crate::clip::{Position, clip_convex, locate};
-use crate::form_factor::point_form_factor;
+use crate::clip::{Position, locate};
 use crate::geometry::Geometry;
-use crate::solution::{ElementLight, Solution};
+use crate::leaf_gather::{LeafGather, SeenNode, Source};
+use crate::solid::Solids;
+use crate::solution::Solution;
 use crate::{LinkSource, NodeId};
 
-/// How much light a reflector's linear elements may misplace at a point before finer ones are opened, as a fraction
-/// of the scene's mean irradiance. Per source and point; smaller opens more elements at every point.
-const SOURCE_BUDGET: f64 = 6e-3;
+/// How much light one reflector may misplace at a point, as a fraction of the scene's mean irradiance, where nothing else is
+/// asked for. Smaller opens more elements at every point, and takes fewer reflectors for dim.
+const SOURCE_ERROR: f64 = 1e-3;
 
 /// How other polygons touch a point of a polygon: how many values irradiance has there.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -38,33 +39,47 @@ pub enum Contact {
 
 /// Answers with the irradiance at points of a solved scene.
 pub struct Gather<'a> {
-    scene: &'a Scene,
-    solution: &'a Solution,
-    geometry: Geometry,
-    /// The luminance that [`SOURCE_BUDGET`] stands for, W·m⁻².
+    pub(crate) scene: &'a Scene,
+    pub(crate) solution: &'a Solution,
+    pub(crate) geometry: Geometry,
+    pub(crate) solids: Solids,
+    /// Irradiance, luminance, W·m⁻², that one reflector may misplace at a point.
     budget: f64,
+    /// Mean luminance of the radiosity that each polygon reflects, W·m⁻².
+    radiosity: Vec<f64>,
 }
 
-/// A gather for the points of one leaf element: sources and blockers that its links name.
-pub struct LeafGather<'a> {
-    gather: &'a Gather<'a>,
+/// What a gather needs to know of a link.
+struct LinkSummary {
+    /// The source's polygon and patch.
     polygon: u32,
-    sources: Vec<Source>,
-    /// Number of distinct blockers of all sources.
-    blocker_count: usize,
-}
-
-struct Source {
-    polygon: u32,
-    /// Each with the number that its polygon has among the leaf's blockers.
-    blockers: Vec<(usize, Blocker)>,
+    patch: u32,
+    blockers: u32,
+    /// Form factor from the element, and its visible part.
+    form_factor: f64,
+    visible: f64,
 }
 
 impl<'a> Gather<'a> {
     /// Prepares a gather over a solution of the scene.
     pub fn new(scene: &'a Scene, solution: &'a Solution) -> Self {
-        let budget = SOURCE_BUDGET * luminance(solution.mean_irradiance);
-        Self { scene, solution, geometry: Geometry::new(scene), budget }
+        Self::with_source_error(scene, solution, SOURCE_ERROR)
+    }
+
+    /// The same with a choice of how much light one reflector may misplace at a point, as a fraction of the scene's mean
+    /// irradiance.
+    pub fn with_source_error(scene: &'a Scene, solution: &'a Solution, source_error: f64) -> Self {
+        let budget = source_error * luminance(solution.mean_irradiance);
+        let radiosity = |polygon| {
+            let area = |root: NodeId| solution.elements.nodes[root as usize].area;
+            let power = |root: NodeId| luminance(solution.light[root as usize].irradiance) * area(root);
+            let total: f64 = solution.patch_roots(polygon).map(power).sum();
+            luminance(scene.material(polygon).reflectance) * total / scene.area(polygon)
+        };
+        let radiosity = scene.polygon_ids().map(radiosity).collect();
+        let geometry = Geometry::new(scene);
+        let solids = Solids::new(scene, &geometry);
+        Self { scene, solution, geometry, solids, budget, radiosity }
     }
 
     /// How other polygons touch a point of a polygon, on its front.
@@ -113,26 +128,89 @@ impl<'a> Gather<'a> {
         line.map_or(Contact::None, |direction| Contact::Line { direction })
     }
 
-    /// A gather for the points in the closure of one leaf element.
-    pub fn over(&'a self, leaf: NodeId) -> LeafGather<'a> {
-        let elements = &self.solution.elements;
-        let polygon = elements.polygon_of(leaf).unwrap_or_default();
-        let mut pairs: Vec<(u32, u32)> = Vec::new(); // (source polygon, blocker), and (source, source) for each source
-        let mut node = leaf;
-        loop {
-            for link in self.solution.links_of(node) {
+    /// A gather for the points in the closure of one element.
+    pub fn over(&'a self, element: NodeId) -> LeafGather<'a> {
+        self.over_sources(element, |_| true)
+    }
+
+    /// The same for light from emitters alone.
+    pub fn over_emitters(&'a self, element: NodeId) -> LeafGather<'a> {
+        self.over_sources(element, |polygon| self.scene.material(polygon).emits())
+    }
+
+    /// How much light, luminance, W·m⁻², the plane over a reflector's node misplaces at a point with the given form factor to
+    /// it: as far as is known, nothing for a leaf.
+    pub fn misplaced(&self, node: NodeId, form_factor: f64) -> f64 {
+        let solution = self.solution;
+        let polygon = solution.elements.polygon_of(node).unwrap_or_default();
+        let reflectance = luminance(self.scene.material(polygon).reflectance);
+        reflectance * solution.light[node as usize].deviation * form_factor
+    }
+
+    /// Irradiance, luminance, W·m⁻², that one reflector may misplace at a point.
+    pub fn budget(&self) -> f64 {
+        self.budget
+    }
+
+    /// Whether a reflector is no more at a point than what it may misplace there, for its form factor if nothing hides it.
+    pub(crate) fn is_dim(&self, polygon: u32, form_factor: f64) -> bool {
+        form_factor * self.radiosity[polygon as usize] <= self.budget
+    }
+
+    fn over_sources(&'a self, element: NodeId, wanted: impl Fn(u32) -> bool) -> LeafGather<'a> {
+        let (solution, elements) = (self.solution, &self.solution.elements);
+        let area = elements.nodes[element as usize].area;
+        let mut links: Vec<LinkSummary> = Vec::new();
+        for node in elements.ancestors(element).chain(elements.descendants(element)) {
+            let share = (elements.nodes[node as usize].area / area).min(1.0);
+            for link in solution.links_of(node) {
                 let LinkSource::Node(source) = link.source;
-                let Some(source) = elements.polygon_of(source) else { continue };
-                pairs.push((source, source));
-                pairs.extend(self.solution.blockers.get(link.blockers).iter().map(|&blocker| (source, blocker)));
+                let Some(patch) = elements.patch_of(source) else { continue };
+                let polygon = elements.patches[patch as usize].polygon;
+                if wanted(polygon) {
+                    let form_factor = share * link.form_factor;
+                    links.push(LinkSummary {
+                        polygon,
+                        patch,
+                        blockers: link.blockers,
+                        form_factor,
+                        visible: form_factor * link.visibility,
+                    });
+                }
             }
-            let parent = elements.nodes[node as usize].parent;
-            if parent == node {
-                break;
-            }
-            node = parent;
         }
-        self.leaf_gather(polygon, pairs)
+        links.sort_by_key(|link| (link.polygon, link.patch, link.blockers));
+        let mut sources = Vec::new();
+        let mut blockers = Vec::new();
+        for links in links.chunk_by(|a, b| a.polygon == b.polygon) {
+            let source = self.source(links);
+            blockers.extend_from_slice(&source.blockers);
+            // What hides a patch from all of the element is named by no link: such a patch must not be looked at, and so the
+            // others are looked at one by one.
+            if source.roots.len() == solution.patches_of(source.polygon).len() {
+                sources.push(source);
+            } else {
+                let part = |&root: &NodeId| Source { roots: vec![root], part: Some(root), ..source.clone() };
+                sources.extend(source.roots.iter().map(part));
+            }
+        }
+        blockers.sort_unstable();
+        blockers.dedup();
+        LeafGather { gather: self, polygon: elements.polygon_of(element).unwrap_or_default(), sources, blockers }
+    }
+
+    /// A source polygon by all links from it.
+    fn source(&self, links: &[LinkSummary]) -> Source {
+        let lists = links.chunk_by(|a, b| a.blockers == b.blockers).map(|links| links[0].blockers);
+        let mut blockers: Vec<u32> = lists.flat_map(|list| self.solution.blockers.get(list)).copied().collect();
+        blockers.sort_unstable();
+        blockers.dedup();
+        let patches = links.chunk_by(|a, b| a.patch == b.patch).map(|links| links[0].patch);
+        let roots = patches.map(|patch| self.solution.elements.patches[patch as usize].root).collect();
+        let (all, visible) =
+            links.iter().fold((0.0, 0.0), |sum, link| (sum.0 + link.form_factor, sum.1 + link.visible));
+        let visibility = if all > 0.0 { visible / all } else { 0.0 };
+        Source { polygon: links[0].polygon, roots, part: None, blockers, before: OnceCell::new(), visibility }
     }
 
     /// Irradiance at a position in the plane of a polygon, W·m⁻²; `inward` is the direction in the plane from whose
@@ -144,32 +222,20 @@ impl<'a> Gather<'a> {
         }
     }
 
-    fn leaf_gather(&'a self, polygon: u32, mut pairs: Vec<(u32, u32)>) -> LeafGather<'a> {
-        pairs.sort_unstable();
-        pairs.dedup();
-        let mut blockers: Vec<u32> = pairs.iter().filter(|(s, b)| s != b).map(|&(_, blocker)| blocker).collect();
-        blockers.sort_unstable();
-        blockers.dedup();
-        let sources = pairs.chunk_by(|a, b| a.0 == b.0).map(|group| self.source(group, &blockers)).collect();
-        LeafGather { gather: self, polygon, sources, blocker_count: blockers.len() }
-    }
-
-    fn source(&self, group: &[(u32, u32)], all: &[u32]) -> Source {
-        let polygon = group[0].0;
-        let blockers = group
-            .iter()
-            .filter(|(source, blocker)| source != blocker)
-            .filter_map(|&(_, blocker)| {
-                let number = all.partition_point(|&other| other < blocker);
-                Some((number, Blocker::before(&self.geometry, &self.geometry.plane(polygon), blocker)?))
+    /// Irradiance from the reflectors that a point sees, W·m⁻².
+    pub fn irradiance_from(&self, seen: &[SeenNode]) -> Rgb {
+        seen.iter()
+            .map(|seen| {
+                let polygon = self.solution.elements.polygon_of(seen.node).unwrap_or_default();
+                let reflectance = self.scene.material(polygon).reflectance;
+                reflectance * self.solution.light[seen.node as usize].at(seen.offset) * seen.form_factor
             })
-            .collect();
-        Source { polygon, blockers }
+            .sum()
     }
 
     /// The leaf of a polygon that contains a position; of several one on the side of `above`, and of these the one that
     /// lies farthest along `towards`.
-    fn leaf_under(&self, polygon: u32, position: DVec3, above: DVec3, towards: DVec3) -> Option<NodeId> {
+    pub(crate) fn leaf_under(&self, polygon: u32, position: DVec3, above: DVec3, towards: DVec3) -> Option<NodeId> {
         let elements = &self.solution.elements;
         let normal = self.geometry.plane(polygon).normal;
         // Points given in a file carry a rounding of their own: the nearest patch is good enough.
@@ -200,186 +266,5 @@ impl<'a> Gather<'a> {
             tolerance *= 10.0;
         }
         None
-    }
-}
-
-impl LeafGather<'_> {
-    /// Irradiance at a position of the leaf, W·m⁻², exact for sources of constant radiosity. `inward` is a direction in
-    /// the leaf's plane: where other polygons touch the position, the limit is taken from that side; elsewhere it
-    /// has no influence.
-    pub fn irradiance(&self, position: DVec3, inward: DVec3) -> Rgb {
-        let gather = self.gather;
-        let up = gather.geometry.plane(self.polygon).normal;
-        let from = Viewpoint { position, up, inward: inward.reject_from_normalized(up).normalize_or_zero() };
-        let mut cones: Vec<Option<Option<BlockerCone>>> = vec![None; self.blocker_count];
-        let mut fragments = Fragments::new(gather.geometry.size);
-        let mut total = Rgb::ZERO;
-        for source in &self.sources {
-            let outline = &gather.geometry.outlines[source.polygon as usize];
-            let plane = gather.geometry.planes[source.polygon as usize];
-            let depth = plane.distance(position);
-            let touches = depth.abs() <= gather.geometry.contact_tolerance;
-            if touches {
-                if plane.normal.dot(from.inward) <= 0.0 {
-                    continue;
-                }
-                fragments.start(&from.tangent_cone(outline, plane.normal, gather.geometry.contact_tolerance), up);
-            } else if depth > 0.0 {
-                let corners: Vec<DVec3> = outline.iter().map(|corner| corner - position).collect();
-                fragments.start(&corners, up);
-            } else {
-                continue;
-            }
-            for (number, blocker) in &source.blockers {
-                if fragments.is_empty() {
-                    break;
-                }
-                let (shape, normal) = blocker.shape(&gather.geometry);
-                let project = || BlockerCone::of_polygon(shape, normal, &from, gather.geometry.contact_tolerance);
-                match blocker {
-                    // A whole polygon looks the same before every source: projected once for the point.
-                    Blocker::Whole { .. } => {
-                        if let Some(cone) = cones[*number].get_or_insert_with(project) {
-                            fragments.subtract(cone);
-                        }
-                    }
-                    Blocker::Part { .. } => {
-                        if let Some(cone) = project() {
-                            fragments.subtract(&cone);
-                        }
-                    }
-                }
-            }
-            let form_factor = fragments.measure(up);
-            total += self.light(source.polygon, &fragments, form_factor, touches, &from);
-        }
-        total
-    }
-
-    /// Irradiance from the visible fragments of one source.
-    fn light(&self, source: u32, fragments: &Fragments, form_factor: f64, touches: bool, from: &Viewpoint) -> Rgb {
-        let (gather, solution) = (self.gather, self.gather.solution);
-        let material = gather.scene.material(source);
-        let light = form_factor * material.exitance();
-        if !solution.reflects() || material.reflectance == Rgb::ZERO {
-            return light;
-        }
-        let mut reflected = Rgb::ZERO;
-        if touches {
-            // In the limit the whole cone meets the source at the point itself.
-            if let Some(leaf) = gather.leaf_under(source, from.position, from.up, from.inward) {
-                let at = solution.reflected_irradiance(leaf, from.position);
-                reflected = at * form_factor;
-            }
-        } else {
-            let budget = gather.budget / luminance(material.reflectance).max(1e-3);
-            for (fragment, form_factor) in fragments.iter() {
-                if solution.is_one_patch(source) {
-                    let root = solution.elements.patches[solution.first_patch[source as usize] as usize].root;
-                    self.open(root, fragment, form_factor, budget, from, &mut reflected);
-                    continue;
-                }
-                for root in solution.patch_roots(source) {
-                    let part = self.clip_to_outline(fragment, root, from);
-                    if part.is_empty() {
-                        continue;
-                    }
-                    let form_factor = point_form_factor(&part, from.up);
-                    self.open(root, &part, form_factor, budget, from, &mut reflected);
-                }
-            }
-        }
-        light + reflected * material.reflectance
-    }
-
-    /// Adds form factor × irradiance over a fragment, which lies within a node; opens the node where its linear
-    /// light is not good enough.
-    fn open(&self, node: NodeId, fragment: &[DVec3], form_factor: f64, budget: f64, from: &Viewpoint, sum: &mut Rgb) {
-        let solution = self.gather.solution;
-        let elements = &solution.elements;
-        if form_factor <= SLIVER {
-            return; // The neighbour's, but for a rounding: there may be a wall on the border between the two.
-        }
-        let light = &solution.light[node as usize];
-        if elements.is_leaf(node) || light.deviation * form_factor <= budget {
-            *sum += form_factor * self.weighted_light(light, node, fragment, from);
-            return;
-        }
-        for child in elements.children(node) {
-            let part = self.clip_to_cell(fragment, node, child, from);
-            if !part.is_empty() {
-                self.open(child, &part, point_form_factor(&part, from.up), budget, from, sum);
-            }
-        }
-    }
-
-    /// The linear light of a node at the centre of a fragment, each part of the fragment weighted by what it sends
-    /// to the point.
-    fn weighted_light(&self, light: &ElementLight, node: NodeId, fragment: &[DVec3], from: &Viewpoint) -> Rgb {
-        let solution = self.gather.solution;
-        let Some(patch) = solution.elements.patch_of(node) else { return light.irradiance };
-        let patch = &solution.elements.patches[patch as usize];
-        let normal = patch.u.cross(patch.v);
-        let centre = fragment.iter().sum::<DVec3>() / fragment.len() as f64;
-        let (mut weighted, mut total) = (DVec3::ZERO, 0.0);
-        for (i, &corner) in fragment.iter().enumerate() {
-            let next = fragment[(i + 1) % fragment.len()];
-            let middle = (centre + corner + next) / 3.0;
-            let area = (corner - centre).cross(next - centre).length();
-            let weight = area * (from.up.dot(middle) * normal.dot(middle)).abs() / middle.length_squared().powi(2);
-            weighted += middle * weight;
-            total += weight;
-        }
-        let middle = if total > 0.0 { weighted / total } else { centre };
-        light.at(patch, solution.elements.nodes[node as usize].centre, from.position + middle)
-    }
-
-    /// The part of a fragment that lies in the outline of a patch's root.
-    fn clip_to_outline(&self, fragment: &[DVec3], node: NodeId, from: &Viewpoint) -> Vec<DVec3> {
-        let elements = &self.gather.solution.elements;
-        let outline = elements.outline(node);
-        let Some(patch) = elements.patch_of(node) else { return Vec::new() };
-        let patch = &elements.patches[patch as usize];
-        let normal = patch.u.cross(patch.v);
-        let edges = outline.iter().enumerate().map(|(i, &corner)| {
-            let inward = normal.cross(outline[(i + 1) % outline.len()] - corner);
-            (inward, inward.dot(corner - from.position))
-        });
-        // Most patches of a polygon that was cut to pieces have nothing of a fragment: found out without copying it.
-        if edges.clone().any(|(inward, border)| fragment.iter().all(|d| inward.dot(*d) <= border)) {
-            return Vec::new();
-        }
-        let mut rest = fragment.to_vec();
-        for (inward, border) in edges {
-            let mut kept = Vec::with_capacity(rest.len() + 1);
-            clip_convex(&rest, 0.0, |d| inward.dot(d) - border, &mut kept);
-            rest = kept;
-        }
-        rest
-    }
-
-    /// The part of a fragment of `node` that lies in the cell of its child.
-    fn clip_to_cell(&self, fragment: &[DVec3], node: NodeId, child: NodeId, from: &Viewpoint) -> Vec<DVec3> {
-        let elements = &self.gather.solution.elements;
-        let (parent, cell) = (&elements.nodes[node as usize], &elements.nodes[child as usize]);
-        let mut rest = fragment.to_vec();
-        let Some(patch) = elements.patch_of(node) else { return rest };
-        let patch = &elements.patches[patch as usize];
-        let origin = patch.origin - from.position;
-        for (axis, index) in [(patch.u, 0), (patch.v, 1)] {
-            let offset = axis.dot(origin);
-            let borders = [
-                (1.0, cell.cell_min[index], parent.cell_min[index]),
-                (-1.0, cell.cell_max[index], parent.cell_max[index]),
-            ];
-            for (sign, border, outer) in borders {
-                if border != outer {
-                    let mut kept = Vec::with_capacity(rest.len() + 1);
-                    clip_convex(&rest, 0.0, |d| sign * (axis.dot(d) - offset - border), &mut kept);
-                    rest = kept;
-                }
-            }
-        }
-        rest
     }
 }

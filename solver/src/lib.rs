@@ -1,6 +1,6 @@
 //! Light arriving anywhere: hierarchical radiosity over a scene's polygons, and exact irradiance at a point.
 //!
-//! The pipeline is [`solve`]: cut → refine (elements, links, blockers) → transport → reconstruct. What it returns,
+//! The pipeline is [`solve`]: cut → refine (elements, links, blockers) → transport. What it returns,
 //! a [`Solution`], feeds [`Gather`], which answers with the irradiance at any surface point.
 
 mod backprojection;
@@ -13,11 +13,12 @@ mod element;
 mod form_factor;
 mod geometry;
 mod irradiance;
+mod leaf_gather;
 mod linear_fit;
 mod oracle;
 mod quadrature;
-mod reconstruct;
 mod refine;
+mod solid;
 mod solution;
 mod solve;
 #[cfg(test)]
@@ -29,7 +30,8 @@ mod visibility;
 pub use cut::{contact_lines, cut_polygon};
 pub use element::{Elements, Node, NodeId, NodeKind, Patch};
 pub use form_factor::{exchange, form_factor, form_factor_at, point_form_factor};
-pub use irradiance::{Contact, Gather, LeafGather};
+pub use irradiance::{Contact, Gather};
+pub use leaf_gather::{LeafGather, SeenNode};
 pub use solution::{
     BlockerLists, Convergence, Cut, ElementLight, Interaction, Link, LinkSource, Solution, SolveOptions,
 };

@@ -57,14 +57,18 @@ pub fn fit_inner_nodes(elements: &Elements, light: &mut [ElementLight]) {
             })
         });
         let (gradient_u, gradient_v) = colour_slope(samples);
-        let mut deviation: f64 = 0.0;
+        let mut square = 0.0;
         for (child, light) in children() {
             let at = place(child.centre);
             let half = (child.cell_max - child.cell_min) / 2.0;
-            let step = (light.irradiance - irradiance - gradient_u * at.x - gradient_v * at.y).abs();
-            let twist = (light.gradient_u - gradient_u).abs() * half.x + (light.gradient_v - gradient_v).abs() * half.y;
-            deviation = deviation.max(luminance(step + twist) + light.deviation);
+            let step = luminance((light.irradiance - irradiance - gradient_u * at.x - gradient_v * at.y).abs());
+            let twist_u = luminance((light.gradient_u - gradient_u).abs()) * half.x;
+            let twist_v = luminance((light.gradient_v - gradient_v).abs()) * half.y;
+            // The mean square of a slope over its cell is a third of that at the border.
+            let inside = (twist_u * twist_u + twist_v * twist_v) / 3.0 + light.deviation * light.deviation;
+            square += (step * step + inside) * child.area / parent.area;
         }
+        let deviation = square.sqrt();
         light[node] = ElementLight { irradiance, gradient_u, gradient_v, deviation };
     }
 }

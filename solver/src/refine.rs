@@ -11,12 +11,11 @@ use scene::Scene;
 
 use crate::backprojection::{BlockerCone, Fragments, Viewpoint};
 use crate::blocker::Blocker;
-use crate::clip::clip_convex;
 use crate::form_factor::{form_factor, form_factor_at};
 use crate::geometry::Geometry;
 use crate::linear_fit::slope;
 use crate::oracle::{Ends, Estimate, Refinement, decide};
-use crate::visibility::{BlockerInterner, Occlusion, Shaft};
+use crate::visibility::{BlockerInterner, Occlusion, Shaft, facing_parts};
 use crate::{Elements, Link, LinkSource, NodeId, Patch};
 
 /// Smallest side of an element, as a fraction of the scene's size: where a corner would be refined for ever.
@@ -292,20 +291,6 @@ impl Network {
     pub fn finish(self) -> (Elements, crate::BlockerLists) {
         (self.elements, self.interner.into_lists())
     }
-}
-
-/// The part of each of two outlines that lies in front of the other's plane; none where either has no such part.
-fn facing_parts(
-    a: &[DVec3],
-    plane_a: &scene::Plane,
-    b: &[DVec3],
-    plane_b: &scene::Plane,
-    tolerance: f64,
-) -> Option<[Vec<DVec3>; 2]> {
-    let (mut front_a, mut front_b) = (Vec::new(), Vec::new());
-    clip_convex(a, tolerance, |p| plane_b.distance(p), &mut front_a);
-    clip_convex(b, tolerance, |p| plane_a.distance(p), &mut front_b);
-    (!front_a.is_empty() && !front_b.is_empty()).then_some([front_a, front_b])
 }
 
 /// Which of some polygons stand in the shaft between two outlines that face each other.

@@ -4,7 +4,8 @@ use glam::{DVec2, DVec3};
 use scene::{Rgb, Scene, luminance};
 use serde::{Deserialize, Serialize};
 
-use crate::{Elements, NodeId, Patch};
+use crate::linear_fit::fit_inner_nodes;
+use crate::{Elements, NodeId};
 
 /// What a solve is asked for.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -97,16 +98,19 @@ pub struct ElementLight {
     pub gradient_u: Rgb,
     /// Change per metre along the patch's v, W·m⁻³.
     pub gradient_v: Rgb,
-    /// How far the light of the leaves below strays from this plane, luminance, W·m⁻²; 0 for a leaf.
+    /// How far the light of the leaves below strays from this plane, root mean square of the luminance, W·m⁻²; 0 for a leaf.
     pub deviation: f64,
 }
 
 impl ElementLight {
-    /// The irradiance at a position of the node, never negative; `centre` is the node's.
-    pub fn at(&self, patch: &Patch, centre: DVec3, position: DVec3) -> Rgb {
-        let offset = position - centre;
-        let linear = self.gradient_u * patch.u.dot(offset) + self.gradient_v * patch.v.dot(offset);
-        (self.irradiance + linear).max(Rgb::ZERO)
+    /// The irradiance at an offset from the node's centre along its patch's u and v, metres; never negative.
+    pub fn at(&self, offset: DVec2) -> Rgb {
+        self.linear(offset).max(Rgb::ZERO)
+    }
+
+    /// The same where the plane falls below zero, too.
+    pub fn linear(&self, offset: DVec2) -> Rgb {
+        self.irradiance + self.gradient_u * offset.x + self.gradient_v * offset.y
     }
 }
 
@@ -138,6 +142,8 @@ pub struct Solution {
     pub blockers: BlockerLists,
     /// Irradiance of each node, W·m⁻².
     pub irradiance: Vec<ElementLight>,
+    /// The part of it that comes straight from emitters.
+    pub direct: Vec<ElementLight>,
     /// The irradiance that each node reflects: one bounce less than [`Solution::irradiance`].
     pub light: Vec<ElementLight>,
     /// Area-weighted mean irradiance of all surfaces, W·m⁻².
@@ -156,15 +162,14 @@ impl Solution {
         &self.links[self.first_link[node as usize] as usize..self.first_link[node as usize + 1] as usize]
     }
 
-    /// Root nodes of a polygon's patches, in order.
-    pub fn patch_roots(&self, polygon: u32) -> impl Iterator<Item = NodeId> {
-        let range = self.first_patch[polygon as usize]..self.first_patch[polygon as usize + 1];
-        range.map(|patch| self.elements.patches[patch as usize].root)
+    /// The patches of a polygon.
+    pub fn patches_of(&self, polygon: u32) -> std::ops::Range<u32> {
+        self.first_patch[polygon as usize]..self.first_patch[polygon as usize + 1]
     }
 
-    /// Whether a polygon was not cut.
-    pub fn is_one_patch(&self, polygon: u32) -> bool {
-        self.first_patch[polygon as usize] + 1 == self.first_patch[polygon as usize + 1]
+    /// Root nodes of a polygon's patches, in order.
+    pub fn patch_roots(&self, polygon: u32) -> impl Iterator<Item = NodeId> {
+        self.patches_of(polygon).map(|patch| self.elements.patches[patch as usize].root)
     }
 
     /// Leaf elements of a polygon, patch by patch.
@@ -190,16 +195,38 @@ impl Solution {
         self.bounces != Some(0)
     }
 
-    /// The irradiance that a leaf reflects at a position on it, W·m⁻².
-    pub fn reflected_irradiance(&self, leaf: NodeId, position: DVec3) -> Rgb {
-        let light = &self.light[leaf as usize];
-        match self.elements.patch_of(leaf) {
-            Some(patch) => {
-                let patch = &self.elements.patches[patch as usize];
-                light.at(patch, self.elements.nodes[leaf as usize].centre, position)
+    /// Divides a leaf element after the solve, for light that is known better than by links. The children have no links of
+    /// their own: what reaches them comes over their ancestors', and what they reflect is the parent's plane.
+    pub fn subdivide(&mut self, leaf: NodeId) {
+        let parent = self.elements.nodes[leaf as usize];
+        let Some(patch) = self.elements.patch_of(leaf) else { return };
+        self.elements.subdivide(leaf);
+        for child in &self.elements.nodes[self.irradiance.len()..] {
+            let offset = self.elements.patches[patch as usize].along(child.centre - parent.centre);
+            for light in [&mut self.irradiance, &mut self.direct, &mut self.light] {
+                let plane = light[leaf as usize];
+                light.push(ElementLight { irradiance: plane.at(offset), ..plane });
             }
-            None => light.irradiance,
+            self.first_link.push(self.links.len() as u32);
         }
+    }
+
+    /// Replaces the light that leaf elements reflect by what is known better; inner nodes follow.
+    pub fn set_light(&mut self, leaves: impl IntoIterator<Item = (NodeId, ElementLight)>) {
+        for (leaf, light) in leaves {
+            self.light[leaf as usize] = light;
+        }
+        fit_inner_nodes(&self.elements, &mut self.light);
+    }
+
+    /// The irradiance on a node that comes over reflectors, as far as the links know it, at an offset from the node's
+    /// centre along its patch's u and v, metres; W·m⁻².
+    pub fn reflected_over_links(&self, node: NodeId, offset: DVec2) -> Rgb {
+        if !self.reflects() {
+            return Rgb::ZERO;
+        }
+        let (all, direct) = (&self.irradiance[node as usize], &self.direct[node as usize]);
+        (all.linear(offset) - direct.linear(offset)).max(Rgb::ZERO)
     }
 
     /// Radiosity ρE + π·Ke of a surface node as a source, W·m⁻².

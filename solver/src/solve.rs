@@ -1,10 +1,8 @@
-//! The solve: cut → link → refine and transport in turns → reconstruct.
+//! The solve: cut → link → refine and transport in turns.
 
 use scene::{Rgb, Scene, luminance};
 
 use crate::cut::{contact_lines, cut_polygon};
-use crate::irradiance::Gather;
-use crate::reconstruct::linear_light;
 use crate::refine::{Network, SourceLight};
 use crate::transport::{Transport, transport};
 use crate::{Elements, Solution, SolveOptions};
@@ -45,7 +43,7 @@ pub fn solve(scene: &Scene, options: &SolveOptions, progress: &(dyn Fn(f64) + Sy
     for pass in 0..REFINEMENTS {
         let light = source_light(scene, &network.elements, &carried);
         let refined = network.refine(&light, link_error);
-        progress(0.1 + 0.6 * f64::from(pass + 1) / f64::from(REFINEMENTS));
+        progress(0.1 + 0.9 * f64::from(pass + 1) / f64::from(REFINEMENTS));
         if !refined {
             break;
         }
@@ -55,7 +53,8 @@ pub fn solve(scene: &Scene, options: &SolveOptions, progress: &(dyn Fn(f64) + Sy
     let (links, first_link, carried) = transported(&network);
     let (elements, blockers) = network.finish();
     let mean_irradiance = mean_irradiance(&elements, &carried);
-    let mut solution = Solution {
+    progress(1.0);
+    Solution {
         elements,
         cuts,
         first_patch,
@@ -63,17 +62,13 @@ pub fn solve(scene: &Scene, options: &SolveOptions, progress: &(dyn Fn(f64) + Sy
         first_link,
         blockers,
         irradiance: carried.irradiance,
-        light: carried.before,
+        direct: carried.direct,
+        light: carried.reflected,
         mean_irradiance,
         convergence: carried.convergence,
         link_error,
         bounces: options.bounces,
-    };
-    if solution.reflects() {
-        solution.light = linear_light(&Gather::new(scene, &solution), &solution, &|done| progress(0.7 + 0.3 * done));
     }
-    progress(1.0);
-    solution
 }
 
 /// What refinement goes by: radiosity as a source, and how far it varies below each node.
@@ -105,6 +100,7 @@ mod tests {
     use glam::DVec3;
 
     use super::*;
+    use crate::Gather;
     use crate::testing::Builder;
 
     fn solved(scene: &Scene, link_error: f64, bounces: Option<u32>) -> Solution {
@@ -218,16 +214,16 @@ mod tests {
     }
 
     #[test]
-    fn bounces_add_up_to_convergence() {
+    fn bounces_add_up() {
         let room = furnished(0.5, 0.3);
-        let at = |bounces: Option<u32>| {
-            let solution = solved(&room, 0.01, bounces);
+        let at = |bounces| {
+            let solution = solved(&room, 0.01, Some(bounces));
             Gather::new(&room, &solution).irradiance_at(4, DVec3::new(3.0, 0.5, 0.0), DVec3::ZERO).x
         };
         let exitance = 0.3 * std::f64::consts::PI;
         // With M everywhere every bounce multiplies by ρ: 1, 1 + ρ, 1 + ρ + ρ², …
-        for (bounces, factor) in [(Some(0), 1.0), (Some(1), 1.5), (Some(2), 1.75), (None, 2.0)] {
-            assert!((at(bounces) / (exitance * factor) - 1.0).abs() < 2e-3, "{bounces:?}: {}", at(bounces) / exitance);
+        for (bounces, factor) in [(0, 1.0), (1, 1.5), (2, 1.75)] {
+            assert!((at(bounces) / (exitance * factor) - 1.0).abs() < 2e-3, "{bounces}: {}", at(bounces) / exitance);
         }
     }
 

@@ -19,10 +19,10 @@ const MOST_ITERATIONS: u32 = 5000;
 pub struct Transport {
     /// Irradiance per node.
     pub irradiance: Vec<ElementLight>,
-    /// The same, one bounce earlier: what the nodes reflect.
+    /// The part of it that comes straight from emitters.
+    pub direct: Vec<ElementLight>,
+    /// The irradiance one bounce earlier: what the nodes reflect.
     pub reflected: Vec<ElementLight>,
-    /// Two bounces earlier.
-    pub before: Vec<ElementLight>,
     /// How the iteration ended.
     pub convergence: Convergence,
 }
@@ -54,8 +54,11 @@ pub fn transport(
     let gathers = bounces.map_or(MOST_ITERATIONS, |bounces| bounces.saturating_add(1).min(MOST_ITERATIONS));
     while result.convergence.iterations < gathers {
         let gathered = gather(links, first_link, &radiosity);
-        result.before = std::mem::replace(&mut result.reflected, std::mem::take(&mut result.irradiance));
+        result.reflected = std::mem::take(&mut result.irradiance);
         result.irradiance = push_pull(elements, gathered);
+        if result.convergence.iterations == 0 {
+            result.direct = result.irradiance.clone();
+        }
         let next = leaving(&result.irradiance);
         let moved = leaf_power(&|i| luminance((next[i] - radiosity[i]).abs()));
         let total = leaf_power(&|i| luminance(next[i]));

@@ -120,14 +120,13 @@ impl Solution {
         for link in &self.links {
             *count.entry(pair(link)).or_default() += 1;
         }
-        let parent = |node: NodeId| self.elements.nodes[node as usize].parent;
-        let ancestors =
-            |node: NodeId| std::iter::successors(Some(node), move |&node| (parent(node) != node).then(|| parent(node)));
         let mut doubled = 0;
         for link in &self.links {
             let (receiver, source) = pair(link);
-            let above = ancestors(receiver)
-                .flat_map(|receiver| ancestors(source).map(move |source| (receiver, source)))
+            let elements = &self.elements;
+            let above = elements
+                .ancestors(receiver)
+                .flat_map(|receiver| elements.ancestors(source).map(move |source| (receiver, source)))
                 .map(|pair| count.get(&pair).copied().unwrap_or(0))
                 .sum::<u32>();
             doubled += u32::from(above > 1);

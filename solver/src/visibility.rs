@@ -163,6 +163,20 @@ fn contains(outline: &[DVec3], normal: DVec3, point: DVec3, tolerance: f64) -> b
     })
 }
 
+/// The part of each of two outlines that lies in front of the other's plane; none where either has no such part.
+pub fn facing_parts(
+    a: &[DVec3],
+    plane_a: &Plane,
+    b: &[DVec3],
+    plane_b: &Plane,
+    tolerance: f64,
+) -> Option<[Vec<DVec3>; 2]> {
+    let (mut front_a, mut front_b) = (Vec::new(), Vec::new());
+    clip_convex(a, tolerance, |p| plane_b.distance(p), &mut front_a);
+    clip_convex(b, tolerance, |p| plane_a.distance(p), &mut front_b);
+    (!front_a.is_empty() && !front_b.is_empty()).then_some([front_a, front_b])
+}
+
 /// Builds [`BlockerLists`]: equal lists get one id, in order of their first appearance; the empty list is 0.
 #[derive(Clone, Debug)]
 pub struct BlockerInterner {

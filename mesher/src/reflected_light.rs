@@ -1,0 +1,461 @@
+//! Light over reflectors, at the nodes of a coarse mesh.
+//!
+//! It is smooth where light from emitters is sharp, and costly to find: a point sees all surfaces of a room. So it has a
+//! mesh of its own, of few large leaves, and what each of its samples sees of the reflectors is found once and kept as a row
+//! of [`SeenNode`]s. Light is then sent over all rows until it no longer changes: a Nyström solution of the radiosity
+//! equation (Atkinson 1997, chapter 4), which no longer depends on the links' form factors but for the choice of what is
+//! near enough to be opened.
+//!
+//! Which leaves are divided is decided by what the coarse mesh gets wrong at points that it was not fitted to, not by what
+//! single links carry (Hardt & Teller 1996, section 7.2).
+
+use std::collections::HashMap;
+
+use glam::{DVec2, DVec3, Vec3};
+use rayon::prelude::*;
+use scene::{Interpolant, Rgb, Scene};
+use solver::{ElementLight, Gather, NodeId, SeenNode, Solution};
+
+use crate::fine_mesh::FineMesh;
+use crate::probe::{at, colour_mean, probe_point};
+use crate::projection::Projection;
+use crate::{Leaf, Mesh, SampleQuery, SampleTable, edge_table, leaf_meshes, sample_table};
+
+/// Light over reflectors on all surfaces.
+pub(crate) struct ReflectedLight {
+    /// The leaves of the coarse mesh, elements of the solution.
+    front: Vec<NodeId>,
+    /// Leaves over which light is quadratic, ascending; over the others it is linear, for a third of the samples.
+    quadratic: Vec<NodeId>,
+    /// What a sample sees, by what it is asked: kept from mesh to mesh.
+    rows: HashMap<Station, Row>,
+    coarse: CoarseMesh,
+    /// What is reflected, at each sample of the fine mesh: the irradiance one bounce earlier.
+    pub reflecting: Vec<Rgb>,
+}
+
+/// Position and direction of approach of a sample, to the bit, on a polygon.
+type Station = (u32, [u64; 6]);
+
+/// What a sample sees of the reflectors.
+type Row = Vec<Seen>;
+
+/// A [`SeenNode`] in a quarter of the memory: f32 has the digits that light needs.
+#[derive(Clone, Copy)]
+struct Seen {
+    node: NodeId,
+    form_factor: f32,
+    offset: [f32; 2],
+}
+
+/// A mesh of the front, without discontinuities.
+#[derive(Default)]
+struct CoarseMesh {
+    leaves: Vec<Leaf>,
+    mesh: Mesh,
+    table: SampleTable,
+    /// First triangle of each leaf, and their number at the end.
+    first: Vec<usize>,
+    /// Samples that are looked at, ascending; the others are midpoints between two of them.
+    looking: Vec<u32>,
+    /// By sample that is not looked at, the two vertices' samples that it is the mean of.
+    between: Vec<(u32, [u32; 2])>,
+    /// Irradiance over reflectors at each sample, W·m⁻².
+    values: Vec<Rgb>,
+}
+
+/// What the coarse mesh gets wrong on one leaf.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct LeafError {
+    /// The element.
+    pub element: NodeId,
+    /// Root mean square over the colours at one point that nothing was fitted to, W·m⁻².
+    pub error: f64,
+    /// The exact light over reflectors there, averaged over the colours, W·m⁻².
+    pub irradiance: f64,
+}
+
+impl ReflectedLight {
+    /// No light yet, and a front of elements that are no longer than `length`, metres, where the solution has such. Elements
+    /// that the solver has divided for the sake of emitters' shadows are not followed.
+    pub fn new(solution: &Solution, length: f64) -> Self {
+        let elements = &solution.elements;
+        let mut front = Vec::new();
+        let mut open: Vec<NodeId> = elements.patches.iter().rev().map(|patch| patch.root).collect();
+        while let Some(node) = open.pop() {
+            if elements.is_leaf(node) || elements.cell_length(node) <= length {
+                front.push(node);
+            } else {
+                open.extend(elements.children(node).rev());
+            }
+        }
+        Self {
+            front,
+            quadratic: Vec::new(),
+            rows: HashMap::new(),
+            coarse: CoarseMesh::default(),
+            reflecting: Vec::new(),
+        }
+    }
+
+    /// Finds the light: meshes the front, finds what new samples see, and sends light to and fro.
+    pub fn solve(&mut self, scene: &Scene, solution: &mut Solution, fine: &FineMesh, options: &Exchange) {
+        let projection = Projection::new(fine, solution);
+        if self.coarse.leaves.is_empty() {
+            self.solve_roughly(scene, solution, fine, &projection, options);
+        }
+        self.coarse = CoarseMesh::new(scene, solution, &self.front, &self.quadratic);
+        let queries: Vec<[SampleQuery; 2]> =
+            self.coarse.looking.iter().map(|&i| stand_ins(solution, &self.coarse.table.queries[i as usize])).collect();
+        self.look(scene, solution, queries.as_flattened(), options, STALE);
+        let places = self.places(solution, fine);
+        let rows: Vec<[&Row; 2]> =
+            queries.iter().map(|pair| pair.each_ref().map(|query| &self.rows[&station(query)])).collect();
+        let receive = |solution: &Solution| received_between(&Radiosity::of(scene, solution), &rows);
+        // Without a limit to the bounces the light that is known is as good a start as any.
+        let mut values = match solution.bounces {
+            Some(_) => vec![Rgb::ZERO; queries.len()],
+            None => receive(solution),
+        };
+        for _ in 0..solution.bounces.unwrap_or(MOST_ITERATIONS) {
+            self.coarse.set_values(&values);
+            self.reflecting = total(&self.coarse, fine, &places);
+            solution.set_light(projection.planes(&self.reflecting));
+            let before = std::mem::replace(&mut values, receive(solution));
+            if solution.bounces.is_none() && largest_move(&before, &values) <= options.residual {
+                break;
+            }
+        }
+        self.coarse.set_values(&values);
+    }
+
+    /// Light as it is at one point of every leaf, on top of the links' slopes. What reflectors send decides what is opened:
+    /// were it known by the links alone, most of what is seen would have to be looked at again.
+    fn solve_roughly(
+        &mut self,
+        scene: &Scene,
+        solution: &mut Solution,
+        fine: &FineMesh,
+        projection: &Projection,
+        options: &Exchange,
+    ) {
+        let over_links = |solution: &Solution, element, position| {
+            solution.reflected_over_links(element, offset(solution, element, position))
+        };
+        let probes: Vec<SampleQuery> = self.front.iter().map(|&leaf| probe(solution, leaf)).collect();
+        let leaf_of = leaf_numbers(solution, &self.front);
+        let mut correction = vec![Rgb::ZERO; self.front.len()];
+        let light = |solution: &Solution, correction: &[Rgb]| -> Vec<Rgb> {
+            let light = |(query, &emitted): (&SampleQuery, &Rgb)| {
+                let correction =
+                    leaf_above(solution, &leaf_of, query.element).map_or(Rgb::ZERO, |leaf| correction[leaf]);
+                emitted + (over_links(solution, query.element, query.position) + correction).max(Rgb::ZERO)
+            };
+            fine.table.queries.iter().zip(&fine.emitted).map(light).collect()
+        };
+        self.reflecting = light(solution, &correction);
+        solution.set_light(projection.planes(&self.reflecting));
+        self.look(scene, solution, &probes, options, STALE);
+        let rows: Vec<&Row> = probes.iter().map(|query| &self.rows[&station(query)]).collect();
+        for _ in 0..ROUGH_ITERATIONS {
+            let values = Radiosity::of(scene, solution).received(&rows);
+            for ((correction, value), query) in correction.iter_mut().zip(values).zip(&probes) {
+                *correction = value - over_links(solution, query.element, query.position);
+            }
+            self.reflecting = light(solution, &correction);
+            solution.set_light(projection.planes(&self.reflecting));
+        }
+    }
+
+    /// The irradiance from everywhere at the samples of a fine mesh, W·m⁻².
+    pub fn irradiance(&self, solution: &Solution, fine: &FineMesh) -> Vec<Rgb> {
+        total(&self.coarse, fine, &self.places(solution, fine))
+    }
+
+    /// The errors of all leaves of the front, each at one point, by what such a point sees.
+    pub fn leaf_errors(&mut self, scene: &Scene, solution: &Solution, options: &Exchange) -> Vec<LeafError> {
+        let queries: Vec<SampleQuery> = self.front.iter().map(|&leaf| probe(solution, leaf)).collect();
+        self.look(scene, solution, &queries, options, STALE_PROBE);
+        let rows: Vec<&Row> = queries.iter().map(|query| &self.rows[&station(query)]).collect();
+        let exact = Radiosity::of(scene, solution).received(&rows);
+        let error = |(leaf, (query, exact)): (usize, (&SampleQuery, Rgb))| {
+            let difference = self.coarse.place(leaf, query).map_or(Rgb::ZERO, |place| self.coarse.at(place)) - exact;
+            LeafError {
+                element: query.element,
+                error: colour_mean(difference * difference).sqrt(),
+                irradiance: colour_mean(exact),
+            }
+        };
+        queries.iter().zip(exact).enumerate().map(error).collect()
+    }
+
+    /// Number of points at which reflectors were looked at.
+    pub fn rows(&self) -> usize {
+        self.rows.len()
+    }
+
+    /// Refines leaves of the front, given ascending: light that was linear becomes quadratic, and where it was that already
+    /// the leaf is divided. Returns whether the solution's elements were divided, too, for want of parts.
+    pub fn refine(&mut self, solution: &mut Solution, leaves: &[NodeId]) -> bool {
+        let (divided, linear): (Vec<NodeId>, Vec<NodeId>) =
+            leaves.iter().partition(|leaf| self.quadratic.binary_search(leaf).is_ok());
+        let whole: Vec<NodeId> = divided.iter().copied().filter(|&leaf| solution.elements.is_leaf(leaf)).collect();
+        whole.iter().for_each(|&leaf| solution.subdivide(leaf));
+        let is_divided = |node: NodeId| divided.binary_search(&node).is_ok();
+        let parts = |node: NodeId| if is_divided(node) { solution.elements.children(node) } else { node..node + 1 };
+        self.front = self.front.iter().flat_map(|&node| parts(node)).collect();
+        self.quadratic.extend(linear);
+        self.quadratic.extend(divided.iter().flat_map(|&node| solution.elements.children(node)));
+        self.quadratic.sort_unstable();
+        !whole.is_empty()
+    }
+
+    /// Finds out what queries see that are not known yet, or were looked at when reflectors were coarser.
+    fn look(&mut self, scene: &Scene, solution: &Solution, queries: &[SampleQuery], options: &Exchange, stale: f64) {
+        let gather = Gather::with_source_error(scene, solution, options.source_error);
+        let allowed = stale * gather.budget();
+        let unknown: Vec<&SampleQuery> = queries
+            .iter()
+            .filter(|query| self.rows.get(&station(query)).is_none_or(|row| is_stale(&gather, row, allowed)))
+            .collect();
+        let mut unknown = unknown;
+        unknown.dedup_by_key(|query| station(query));
+        let groups: Vec<&[&SampleQuery]> = unknown.chunk_by(|a, b| a.element == b.element).collect();
+        let found: Vec<Vec<Row>> = groups
+            .par_iter()
+            .map(|group| {
+                let element = gather.over(group[0].element);
+                let mut seen = Vec::new();
+                let row = |query: &&SampleQuery| {
+                    seen.clear();
+                    element.seen_nodes(query.position, query.inward, &mut seen);
+                    seen.iter().map(Seen::from).collect()
+                };
+                group.iter().map(row).collect()
+            })
+            .collect();
+        self.rows.extend(unknown.iter().map(|query| station(query)).zip(found.into_iter().flatten()));
+    }
+
+    /// Where the samples of a fine mesh lie on the coarse one; nowhere if that has no triangles there.
+    fn places(&self, solution: &Solution, fine: &FineMesh) -> Vec<Option<Place>> {
+        let leaf_of = leaf_numbers(solution, &self.front);
+        let place = |query: &SampleQuery| self.coarse.place(leaf_above(solution, &leaf_of, query.element)?, query);
+        fine.table.queries.par_iter().map(place).collect()
+    }
+}
+
+/// By node of the solution, which leaf of a front it is.
+fn leaf_numbers(solution: &Solution, front: &[NodeId]) -> Vec<Option<usize>> {
+    let mut numbers = vec![None; solution.elements.nodes.len()];
+    for (number, &leaf) in front.iter().enumerate() {
+        numbers[leaf as usize] = Some(number);
+    }
+    numbers
+}
+
+/// The leaf of a front that an element is, or is a part of.
+fn leaf_above(solution: &Solution, leaf_of: &[Option<usize>], element: NodeId) -> Option<usize> {
+    solution.elements.ancestors(element).find_map(|node| leaf_of[node as usize])
+}
+
+/// How light is sent over rows.
+#[derive(Clone, Copy)]
+pub(crate) struct Exchange {
+    /// Light that a reflector's elements may misplace at a point before finer ones are opened, as a fraction of the scene's
+    /// mean irradiance.
+    pub source_error: f64,
+    /// The largest change of a sample with which the iteration ends, W·m⁻².
+    pub residual: f64,
+}
+
+/// What a row may misplace before it is looked at anew, in what one reflector may misplace at a point: a row names a hundred
+/// nodes. Less finds most rows wanting after every division.
+const STALE: f64 = 3.0;
+
+/// The same for probes, which only tell errors.
+const STALE_PROBE: f64 = 10.0;
+
+/// Times that light is sent between the probe points of the leaves: what is left of its change is a hundredth in a room that
+/// reflects half.
+const ROUGH_ITERATIONS: u32 = 6;
+
+/// Times that light is sent over the rows at most: at reflectance 0.99 about 1,600 are needed.
+const MOST_ITERATIONS: u32 = 5000;
+
+/// A place on a coarse mesh.
+#[derive(Clone, Copy)]
+struct Place {
+    triangle: u32,
+    s: f64,
+    t: f64,
+}
+
+impl From<&SeenNode> for Seen {
+    fn from(seen: &SeenNode) -> Self {
+        Self { node: seen.node, form_factor: seen.form_factor as f32, offset: seen.offset.as_vec2().to_array() }
+    }
+}
+
+fn station(query: &SampleQuery) -> Station {
+    let [x, y, z] = query.position.to_array().map(f64::to_bits);
+    let [u, v, w] = query.inward.to_array().map(f64::to_bits);
+    (query.polygon, [x, y, z, u, v, w])
+}
+
+/// Whether a row refers to nodes that have been divided since and whose light has turned out not to be linear, so that it
+/// misplaces more than `allowed`, W·m⁻². What single nodes misplace is of either sign: squares add up.
+fn is_stale(gather: &Gather<'_>, row: &Row, allowed: f64) -> bool {
+    let excess = |seen: &Seen| (gather.misplaced(seen.node, f64::from(seen.form_factor)) - gather.budget()).max(0.0);
+    row.iter().map(|seen| excess(seen).powi(2)).sum::<f64>() > allowed * allowed
+}
+
+/// What every node reflects: its radiosity as a plane, W·m⁻², in the digits that light needs, so that the light of a room
+/// stays in a processor's cache.
+struct Radiosity(Vec<[Vec3; 3]>);
+
+impl Radiosity {
+    fn of(scene: &Scene, solution: &Solution) -> Self {
+        let node = |(node, light): (u32, &ElementLight)| {
+            let polygon = solution.elements.polygon_of(node);
+            let reflectance = polygon.map_or(Rgb::ZERO, |polygon| scene.material(polygon).reflectance);
+            [light.irradiance, light.gradient_u, light.gradient_v].map(|part| (reflectance * part).as_vec3())
+        };
+        Self((0..).zip(&solution.light).map(node).collect())
+    }
+
+    /// What rows receive, W·m⁻².
+    fn received(&self, rows: &[&Row]) -> Vec<Rgb> {
+        let part = |seen: &Seen| {
+            let [middle, along_u, along_v] = self.0[seen.node as usize];
+            (middle + along_u * seen.offset[0] + along_v * seen.offset[1]).max(Vec3::ZERO) * seen.form_factor
+        };
+        rows.par_iter().with_min_len(64).map(|row| row.iter().map(part).sum::<Vec3>().as_dvec3()).collect()
+    }
+}
+
+/// The same for samples that two rows stand in for: what lies on the line through the two at the sample.
+fn received_between(radiosity: &Radiosity, rows: &[[&Row; 2]]) -> Vec<Rgb> {
+    let values = radiosity.received(rows.as_flattened());
+    values.chunks(2).map(|pair| (2.0 * pair[0] - pair[1]).max(Rgb::ZERO)).collect()
+}
+
+/// How far from a contact its stand-ins lie, as parts of the way to the middle of the element. Nearer ones feel more of what
+/// is special to the contact, farther ones miss more of what curves.
+const ASIDE: f64 = 0.07;
+
+/// Where a sample is looked at: twice at its own place, or at a contact at two places aside.
+///
+/// At a contact the slope of the light over reflectors is infinite (it goes with d ln d at the distance d), and an interpolant
+/// through the limit is off over all of the leaf. One through what the light is a little aside, continued in a straight line,
+/// is off in a strip.
+fn stand_ins(solution: &Solution, query: &SampleQuery) -> [SampleQuery; 2] {
+    if query.inward == DVec3::ZERO {
+        return [*query; 2];
+    }
+    let centre = solution.elements.nodes[query.element as usize].centre;
+    let aside = |part: f64| SampleQuery { position: query.position.lerp(centre, part), inward: DVec3::ZERO, ..*query };
+    [aside(ASIDE), aside(2.0 * ASIDE)]
+}
+
+fn total(coarse: &CoarseMesh, fine: &FineMesh, places: &[Option<Place>]) -> Vec<Rgb> {
+    let reflected = |place: &Option<Place>| place.map_or(Rgb::ZERO, |place| coarse.at(place));
+    fine.emitted.iter().zip(places).map(|(&emitted, place)| emitted + reflected(place)).collect()
+}
+
+fn largest_move(from: &[Rgb], to: &[Rgb]) -> f64 {
+    from.iter().zip(to).map(|(a, b)| (a - b).abs().max_element()).fold(0.0, f64::max)
+}
+
+fn offset(solution: &Solution, element: NodeId, position: DVec3) -> DVec2 {
+    let elements = &solution.elements;
+    let Some(patch) = elements.patch_of(element) else { return DVec2::ZERO };
+    elements.patches[patch as usize].along(position - elements.nodes[element as usize].centre)
+}
+
+impl CoarseMesh {
+    fn new(scene: &Scene, solution: &Solution, front: &[NodeId], quadratic: &[NodeId]) -> Self {
+        let elements = &solution.elements;
+        let leaf = |&element: &NodeId| Leaf {
+            element,
+            polygon: elements.polygon_of(element).unwrap_or_default(),
+            outline: elements.outline(element).to_vec(),
+            segments: Vec::new(),
+        };
+        let leaves: Vec<Leaf> = front.iter().map(leaf).collect();
+        let mesh = leaf_meshes(&edge_table(scene, &solution.cuts, &leaves));
+        let gather = Gather::new(scene, solution);
+        let table = sample_table(scene, &leaves, &mesh, &|polygon, position| gather.contact(polygon, position));
+        let mut first = vec![0; leaves.len() + 1];
+        for triangle in &mesh.triangles {
+            first[triangle.leaf as usize + 1] += 1;
+        }
+        for i in 1..first.len() {
+            first[i] += first[i - 1];
+        }
+        // A midpoint is looked at if any leaf that has it is quadratic: so neighbours agree on their border.
+        let mut ends: Vec<Option<[u32; 2]>> = vec![None; table.queries.len()];
+        let mut looks = vec![false; table.queries.len()];
+        for (triangle, samples) in mesh.triangles.iter().zip(&table.triangles) {
+            let is_quadratic = quadratic.binary_search(&leaves[triangle.leaf as usize].element).is_ok();
+            for i in 0..6 {
+                looks[samples[i] as usize] |= is_quadratic || i % 2 == 0;
+                ends[samples[i] as usize] = Some([samples[(i + 5) % 6], samples[(i + 1) % 6]]);
+            }
+        }
+        let (looking, others): (Vec<u32>, Vec<u32>) = (0..looks.len() as u32).partition(|&i| looks[i as usize]);
+        let between = others.into_iter().filter_map(|i| Some((i, ends[i as usize]?))).collect();
+        let values = vec![Rgb::ZERO; table.queries.len()];
+        Self { leaves, mesh, table, first, looking, between, values }
+    }
+
+    /// Sets the values of all samples by those that are looked at.
+    fn set_values(&mut self, values: &[Rgb]) {
+        for (&sample, &value) in self.looking.iter().zip(values) {
+            self.values[sample as usize] = value;
+        }
+        for &(sample, [a, b]) in &self.between {
+            self.values[sample as usize] = (self.values[a as usize] + self.values[b as usize]) / 2.0;
+        }
+    }
+
+    fn corners(&self, triangle: usize) -> [DVec3; 3] {
+        self.mesh.triangles[triangle].vertices.map(|vertex| self.mesh.vertices[vertex as usize])
+    }
+
+    /// The value at a place, never negative.
+    fn at(&self, place: Place) -> Rgb {
+        let samples = self.table.triangles[place.triangle as usize];
+        Interpolant::through(samples.map(|sample| self.values[sample as usize])).evaluate(place.s, place.t)
+    }
+
+    /// Where a query lies within a leaf: in the triangle that it is deepest in.
+    fn place(&self, leaf: usize, query: &SampleQuery) -> Option<Place> {
+        /// Part of the way inwards by which a query on the border between two triangles is told to be on its own side.
+        const INWARDS: f64 = 1e-6;
+        let middle = scene::centroid(&self.leaves[leaf].outline);
+        let position = query.position + query.inward * (INWARDS * query.position.distance(middle));
+        let place = |triangle: usize| {
+            let [a, b, c] = self.corners(triangle);
+            let normal = (b - a).cross(c - a);
+            let part =
+                |from: DVec3, to: DVec3| normal.dot((to - from).cross(position - from)) / normal.length_squared();
+            let (s, t) = (part(c, a), part(a, b));
+            let depth = s.min(t).min(1.0 - s - t);
+            (depth, Place { triangle: triangle as u32, s, t })
+        };
+        let places = (self.first[leaf]..self.first[leaf + 1]).map(place);
+        places.max_by(|x, y| x.0.total_cmp(&y.0)).map(|(_, place)| place)
+    }
+}
+
+/// The point at which an element is probed. It depends on the element alone: a finer neighbour changes the triangles, and
+/// what the point sees is known already. It lies towards another edge of each element, so that what all miss is not the same.
+fn probe(solution: &Solution, element: NodeId) -> SampleQuery {
+    let elements = &solution.elements;
+    let outline = elements.outline(element);
+    let corner = |i: usize| outline[(element as usize + i) % outline.len()];
+    let position = at([elements.nodes[element as usize].centre, corner(0), corner(1)], probe_point(0));
+    let polygon = elements.polygon_of(element).unwrap_or_default();
+    SampleQuery { position, polygon, element, inward: DVec3::ZERO }
+}

@@ -1,0 +1,171 @@
+//! The residual of a bake: what one more bounce, found by other means, would change.
+//!
+//! At points spread evenly by area light is found once more: from emitters exactly, over reflectors by the planes of the
+//! nodes that a point sees, corrected by rays. A ray reads at its end by how much the bake differs from the plane that was
+//! taken for it. So rays have no bias, and little to scatter about (a control variate): what the bake differs by is the error of
+//! its interpolants, of the planes and of what was not opened, all together. There are two independent halves of the rays, and
+//! the mean square is that of the products of the two differences, in which what scatter there is cancels.
+
+use std::collections::HashMap;
+use std::f64::consts::TAU;
+
+use glam::DVec3;
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::{Rng, SeedableRng};
+use rayon::prelude::*;
+use scene::{Bvh, Interpolant, Ray, Rgb, SAMPLE_BARYCENTRICS, Scene};
+use solver::{ElementLight, Gather, NodeId, SeenNode, Solution};
+
+use crate::fine_mesh::FineMesh;
+use crate::probe::{at, colour_mean};
+
+/// Points of which a residual is taken. Twice as many halve the variance of the measured error at twice the cost.
+const POINTS: usize = 1024;
+
+/// What each half may scatter by at a point, as a part of the tolerance; and the rays that it takes at least and at most.
+const SCATTER: f64 = 1.0;
+const RAYS: [f64; 2] = [4.0, 4096.0];
+
+/// The part of the tolerance that one reflector may misplace at a point before its elements are opened: rays correct it, so
+/// more only makes them scatter.
+const SOURCE_SHARE: f64 = 0.3;
+
+/// What was measured at one point.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct ResidualPoint {
+    /// Bake minus exact of the two halves, W·m⁻².
+    pub differences: [Rgb; 2],
+    /// The exact irradiance by both halves, averaged over the colours, W·m⁻².
+    pub irradiance: f64,
+    pub triangle: u32,
+}
+
+/// Measures at a fixed set of points. `samples` are the bake's irradiances at the samples of the fine mesh, `reflecting` what
+/// its reflectors send, W·m⁻².
+pub(crate) fn residual(
+    scene: &Scene,
+    solution: &Solution,
+    fine: &FineMesh,
+    samples: &[Rgb],
+    reflecting: &[Rgb],
+    tolerance: f64,
+) -> Vec<ResidualPoint> {
+    let gather = Gather::with_source_error(scene, solution, SOURCE_SHARE * tolerance);
+    let bvh = Bvh::of_triangles((0..fine.triangles()).map(|triangle| fine.corners(triangle)).collect());
+    let mean = colour_mean(solution.mean_irradiance);
+    let misfits = misfits(scene, solution, fine, reflecting);
+    let value = |samples: &[Rgb], triangle: usize, s: f64, t: f64| {
+        Interpolant::through(fine.table.triangles[triangle].map(|sample| samples[sample as usize])).evaluate(s, t)
+    };
+    let polygon_of = |triangle: u32| fine.leaves[fine.mesh.triangles[triangle as usize].leaf as usize].polygon;
+    // By how much the bake at the end of a ray differs from the plane of the seen node that it lies on.
+    let correction = |origin: DVec3, direction: DVec3, polygon: u32, seen: &HashMap<NodeId, ElementLight>| {
+        let hit = bvh.closest_hit_among(&Ray { origin, direction }, |triangle| polygon_of(triangle) != polygon)?;
+        if hit.normal.dot(direction) >= 0.0 {
+            return None;
+        }
+        let leaf = &fine.leaves[fine.mesh.triangles[hit.id as usize].leaf as usize];
+        let node = solution.elements.ancestors(leaf.element).find(|node| seen.contains_key(node));
+        let plane = node.map_or(Rgb::ZERO, |node| {
+            let patch = &solution.elements.patches[solution.elements.patch_of(node).unwrap_or_default() as usize];
+            let at = origin + direction * hit.distance - solution.elements.nodes[node as usize].centre;
+            seen[&node].linear(patch.along(at))
+        });
+        Some(scene.material(leaf.polygon).reflectance * (value(reflecting, hit.id as usize, hit.s, hit.t) - plane))
+    };
+    points(fine)
+        .into_par_iter()
+        .enumerate()
+        .map(|(number, (triangle, s, t))| {
+            let leaf = &fine.leaves[fine.mesh.triangles[triangle].leaf as usize];
+            let position = at(fine.corners(triangle), (s, t));
+            let element = gather.over(leaf.element);
+            let mut seen = Vec::new();
+            element.seen_nodes(position, DVec3::ZERO, &mut seen);
+            let known = element.emitted(position, DVec3::ZERO) + gather.irradiance_from(&seen);
+            let planes = seen.iter().map(|seen| (seen.node, solution.light[seen.node as usize])).collect();
+            let normal = scene.plane(leaf.polygon).normal;
+            let mut random = ChaCha8Rng::seed_from_u64(number as u64);
+            let differs = |direction| correction(position, direction, leaf.polygon, &planes).unwrap_or(Rgb::ZERO);
+            // A ray scatters by what it finds, and finds a node as often as its form factor says: known before the first ray,
+            // where a few rays would miss the small bright node that matters most.
+            let square = |seen: &SeenNode| seen.form_factor * misfits[seen.node as usize];
+            let scatter = seen.iter().map(square).sum::<f64>();
+            let accepted = SCATTER * tolerance * colour_mean(known).max(mean);
+            let rays =
+                if seen.is_empty() { 0 } else { (scatter / (accepted * accepted)).clamp(RAYS[0], RAYS[1]) as u32 };
+            let halves = [(); 2].map(|()| {
+                let sum: Rgb = hemisphere(normal, rays, &mut random).map(differs).sum();
+                known + sum / f64::from(rays.max(1))
+            });
+            let baked = value(samples, triangle, s, t);
+            ResidualPoint {
+                differences: halves.map(|half| baked - half),
+                irradiance: colour_mean((halves[0] + halves[1]) / 2.0),
+                triangle: triangle as u32,
+            }
+        })
+        .collect()
+}
+
+/// By node, the mean square of what the radiosity of the bake differs by from the node's plane, averaged over the colours.
+fn misfits(scene: &Scene, solution: &Solution, fine: &FineMesh, reflecting: &[Rgb]) -> Vec<f64> {
+    let elements = &solution.elements;
+    let mut sums = vec![0.0; elements.nodes.len()];
+    for (triangle, samples) in fine.table.triangles.iter().enumerate() {
+        let leaf = &fine.leaves[fine.mesh.triangles[triangle].leaf as usize];
+        let patch = &elements.patches[elements.patch_of(leaf.element).unwrap_or_default() as usize];
+        let reflectance = scene.material(leaf.polygon).reflectance;
+        let corners = fine.corners(triangle);
+        let part = scene::area_vector(&corners).length() / SAMPLE_BARYCENTRICS.len() as f64;
+        for (&place, &sample) in SAMPLE_BARYCENTRICS.iter().zip(samples) {
+            let position = at(corners, place);
+            for node in elements.ancestors(leaf.element).filter(|&node| elements.patch_of(node).is_some()) {
+                let offset = patch.along(position - elements.nodes[node as usize].centre);
+                let difference =
+                    reflectance * (reflecting[sample as usize] - solution.light[node as usize].linear(offset));
+                sums[node as usize] += part * colour_mean(difference * difference);
+            }
+        }
+    }
+    sums.iter().zip(&elements.nodes).map(|(sum, node)| if node.area > 0.0 { sum / node.area } else { 0.0 }).collect()
+}
+
+/// Points spread evenly by area: triangle and barycentrics.
+fn points(fine: &FineMesh) -> Vec<(usize, f64, f64)> {
+    let mut sum = 0.0;
+    let ends: Vec<f64> = (0..fine.triangles())
+        .map(|triangle| {
+            sum += scene::area_vector(&fine.corners(triangle)).length();
+            sum
+        })
+        .collect();
+    let mut random = ChaCha8Rng::seed_from_u64(u64::MAX);
+    (0..POINTS)
+        .filter_map(|i| {
+            let area = (i as f64 + uniform(&mut random)) / POINTS as f64 * sum;
+            let triangle = ends.partition_point(|&end| end <= area);
+            let (s, t) = (uniform(&mut random), uniform(&mut random));
+            let (s, t) = if s + t > 1.0 { (1.0 - s, 1.0 - t) } else { (s, t) };
+            (triangle < ends.len()).then_some((triangle, s, t))
+        })
+        .collect()
+}
+
+/// Directions about a normal with a density of the cosine over π: a rank-1 lattice with a random shift, spread evenly.
+fn hemisphere(normal: DVec3, count: u32, random: &mut ChaCha8Rng) -> impl Iterator<Item = DVec3> + use<> {
+    /// The powers of the plastic number, whose multiples fill the square evenly (Roberts 2018).
+    const STEP: [f64; 2] = [0.754_877_666_246_692_8, 0.569_840_290_998_053_3];
+    let shift = [uniform(random), uniform(random)];
+    let (x, y) = normal.any_orthonormal_pair();
+    (0..count).map(move |i| {
+        let u = (shift[0] + f64::from(i) * STEP[0]).fract();
+        let (sin, cos) = (TAU * (shift[1] + f64::from(i) * STEP[1]).fract()).sin_cos();
+        (x * cos + y * sin) * u.sqrt() + normal * (1.0 - u).sqrt()
+    })
+}
+
+/// Uniform in 0..1, never 1: the 53 bits that an f64 holds.
+fn uniform(random: &mut ChaCha8Rng) -> f64 {
+    (random.next_u64() >> 11) as f64 * (0.5 / (1u64 << 52) as f64)
+}

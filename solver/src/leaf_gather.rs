@@ -1,0 +1,393 @@
+//! A gather to the points of one leaf (Hardt & Teller 1996, section 5): its sources with their blockers, the fragments
+//! that a point sees of them, and the nodes that these fragments are parts of.
+//!
+//! What a point sees of reflectors does not depend on how bright they are. It is told as a list of [`SeenNode`]s, so that
+//! light can be sent over it again and again, until it no longer changes, for one search for what is visible.
+//!
+//! A room of a hundred polygons has a dozen that matter at any one point. The others are told from them by their form factor
+//! as if nothing hid them; for these the links' visibility is good enough.
+
+use std::borrow::Cow;
+use std::cell::OnceCell;
+use std::collections::HashMap;
+
+use glam::{DVec2, DVec3};
+use scene::Rgb;
+
+use crate::backprojection::{BlockerCone, Fragments, SLIVER, Viewpoint};
+use crate::blocker::Blocker;
+use crate::clip::clip_convex;
+use crate::form_factor::{form_factor_at, point_form_factor};
+use crate::{Gather, NodeId};
+
+/// The part of a source's form factor from which on nothing is taken to hide it: above the rounding of its clipping.
+const WHOLE: f64 = 1.0 - 1e-9;
+
+/// The second derivative of what a point sees of a place, relative to it and in units of the distance, is a few at most, at
+/// all angles that matter. Less opens fewer nodes.
+const CURVATURE: f64 = 2.0;
+
+/// A gather for the points of one leaf element: sources and blockers that its links name.
+pub struct LeafGather<'a> {
+    pub(crate) gather: &'a Gather<'a>,
+    pub(crate) polygon: u32,
+    pub(crate) sources: Vec<Source>,
+    /// All blockers of all sources, ascending.
+    pub(crate) blockers: Vec<u32>,
+}
+
+/// A source polygon before a leaf, or one patch of it.
+#[derive(Clone)]
+pub(crate) struct Source {
+    pub polygon: u32,
+    /// Root nodes of the patches that it stands for.
+    pub roots: Vec<NodeId>,
+    /// The root, if it stands for one patch of several alone.
+    pub part: Option<NodeId>,
+    /// Polygons that may hide it, ascending.
+    pub blockers: Vec<u32>,
+    /// The same as they are before the source: found out when a point needs them first, since most sources are too dim for
+    /// that.
+    pub before: OnceCell<Vec<Obstacle>>,
+    /// The visible fraction of the source, 0..=1, as the links know it.
+    pub visibility: f64,
+}
+
+/// What may hide a source: a polygon, or several that are faces of one convex solid.
+#[derive(Clone)]
+pub(crate) struct Obstacle {
+    solid: Option<u32>,
+    /// Each with its number among the leaf's blockers.
+    faces: Vec<(usize, Blocker)>,
+}
+
+impl Source {
+    /// Corners, metres.
+    pub fn outline<'a>(&self, gather: &'a Gather<'_>) -> &'a [DVec3] {
+        match self.part {
+            Some(root) => gather.solution.elements.outline(root),
+            None => gather.geometry.outline(self.polygon),
+        }
+    }
+}
+
+/// What obstacles hide from one point, as far as it has been asked: no cone where one hides nothing, or a solid has none.
+struct Cones {
+    of_solids: HashMap<u32, Option<BlockerCone>>,
+    /// By number among the leaf's blockers.
+    of_faces: Vec<Option<Option<BlockerCone>>>,
+}
+
+/// What a point sees of a node of the hierarchy.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SeenNode {
+    /// The node.
+    pub node: NodeId,
+    /// Form factor from the point to what it sees of the node, 0..=1.
+    pub form_factor: f64,
+    /// Mean place of what is seen, each part weighted by what it sends to the point: offset from the node's centre along
+    /// its patch's u and v, metres.
+    pub offset: DVec2,
+}
+
+/// Which of its sources' light a point is asked for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Light {
+    Emitted,
+    Reflected,
+    Both,
+}
+
+impl LeafGather<'_> {
+    /// Irradiance at a position of the leaf, W·m⁻². `inward` is a direction in the leaf's plane: where other polygons
+    /// touch the position, the limit is taken from that side; elsewhere it has no influence.
+    pub fn irradiance(&self, position: DVec3, inward: DVec3) -> Rgb {
+        let mut seen = Vec::new();
+        let emitted = self.look(position, inward, Light::Both, &mut seen);
+        emitted + self.gather.irradiance_from(&seen)
+    }
+
+    /// The part of the irradiance that comes straight from emitters, W·m⁻²: exact.
+    pub fn emitted(&self, position: DVec3, inward: DVec3) -> Rgb {
+        self.look(position, inward, Light::Emitted, &mut Vec::new())
+    }
+
+    /// Appends the nodes of reflectors that a position sees. Nodes are opened as far as the light of the solution asks for.
+    pub fn seen_nodes(&self, position: DVec3, inward: DVec3, seen: &mut Vec<SeenNode>) {
+        self.look(position, inward, Light::Reflected, seen);
+    }
+
+    /// What may hide a source: its blockers in front of it, gathered to solids where all of a solid is.
+    fn before(&self, source: &Source) -> Vec<Obstacle> {
+        let Gather { scene, geometry, solids, .. } = self.gather;
+        let plane = geometry.plane(source.polygon);
+        let mut obstacles: Vec<Obstacle> = Vec::new();
+        for &polygon in &source.blockers {
+            let number = self.blockers.partition_point(|&other| other < polygon);
+            let Some(blocker) = Blocker::before(geometry, &plane, polygon) else { continue };
+            let known = |solid: u32| obstacles.iter().position(|obstacle| obstacle.solid == Some(solid));
+            let solid = solids.of_polygon(polygon);
+            if let Some(place) = solid.and_then(known) {
+                obstacles[place].faces.push((number, blocker));
+                continue;
+            }
+            let whole = |&solid: &u32| solids.is_before(scene, solid, &plane, geometry.contact_tolerance);
+            obstacles.push(Obstacle { solid: solid.filter(whole), faces: vec![(number, blocker)] });
+        }
+        obstacles
+    }
+
+    /// Cuts away what an obstacle hides from a point. `cones` are those that the point has needed so far, by number.
+    fn subtract(&self, obstacle: &Obstacle, from: &Viewpoint, cones: &mut Cones, fragments: &mut Fragments) {
+        let Gather { scene, geometry, solids, .. } = self.gather;
+        if let Some(solid) = obstacle.solid {
+            let cone = cones.of_solids.entry(solid).or_insert_with(|| solids.cone(scene, geometry, solid, from));
+            if let Some(cone) = cone {
+                return fragments.subtract(cone);
+            }
+        }
+        for (number, blocker) in &obstacle.faces {
+            let (shape, normal) = blocker.shape(geometry);
+            let project = || BlockerCone::of_polygon(shape, normal, from, geometry.contact_tolerance);
+            match blocker {
+                // A whole polygon looks the same before every source: projected once for the point.
+                Blocker::Whole { .. } => {
+                    if let Some(cone) = cones.of_faces[*number].get_or_insert_with(project) {
+                        fragments.subtract(cone);
+                    }
+                }
+                Blocker::Part { .. } => {
+                    if let Some(cone) = project() {
+                        fragments.subtract(&cone);
+                    }
+                }
+            }
+        }
+    }
+
+    /// Irradiance from emitters, and the nodes of reflectors that are seen.
+    fn look(&self, position: DVec3, inward: DVec3, wanted: Light, seen: &mut Vec<SeenNode>) -> Rgb {
+        let gather = self.gather;
+        let up = gather.geometry.plane(self.polygon).normal;
+        let from = Viewpoint { position, up, inward: inward.reject_from_normalized(up).normalize_or_zero() };
+        let mut cones = Cones { of_solids: HashMap::new(), of_faces: vec![None; self.blockers.len()] };
+        let mut fragments = Fragments::new(gather.geometry.size);
+        let mut total = Rgb::ZERO;
+        for source in &self.sources {
+            let material = gather.scene.material(source.polygon);
+            let emits = wanted != Light::Reflected && material.emits();
+            let reflects = wanted != Light::Emitted && gather.solution.reflects() && material.reflectance != Rgb::ZERO;
+            if !emits && !reflects {
+                continue;
+            }
+            let outline = source.outline(gather);
+            let plane = gather.geometry.planes[source.polygon as usize];
+            let depth = plane.distance(position);
+            let touches = depth.abs() <= gather.geometry.contact_tolerance;
+            let unoccluded =
+                if reflects && depth > 0.0 && !touches { form_factor_at(position, up, outline) } else { 0.0 };
+            if !emits && !touches && gather.is_dim(source.polygon, unoccluded) {
+                self.see_dim(source, unoccluded, seen);
+                continue;
+            }
+            if touches {
+                if plane.normal.dot(from.inward) <= 0.0 {
+                    continue;
+                }
+                fragments.start(&from.tangent_cone(outline, plane.normal, gather.geometry.contact_tolerance), up);
+            } else if depth > 0.0 {
+                let corners: Vec<DVec3> = outline.iter().map(|corner| corner - position).collect();
+                fragments.start(&corners, up);
+            } else {
+                continue;
+            }
+            for obstacle in source.before.get_or_init(|| self.before(source)) {
+                if fragments.is_empty() {
+                    break;
+                }
+                self.subtract(obstacle, &from, &mut cones, &mut fragments);
+            }
+            let form_factor = fragments.measure(up);
+            if emits {
+                total += form_factor * material.exitance();
+            }
+            if reflects && form_factor > 0.0 {
+                if touches {
+                    self.see_contact(source.polygon, form_factor, &from, seen);
+                } else if form_factor >= unoccluded * WHOLE {
+                    self.see_whole(source, &from, seen);
+                } else {
+                    self.see_fragments(source, &fragments, &from, seen);
+                }
+            }
+        }
+        total
+    }
+
+    /// What a point sees of a reflector that is too dim for its blockers to be projected: the links know what is visible of it
+    /// well enough. Its patches share what is seen by their areas.
+    fn see_dim(&self, source: &Source, form_factor: f64, seen: &mut Vec<SeenNode>) {
+        let elements = &self.gather.solution.elements;
+        let area = |root: NodeId| elements.nodes[root as usize].area;
+        let per_area = form_factor * source.visibility / source.roots.iter().map(|&root| area(root)).sum::<f64>();
+        let seen_of = |&node: &NodeId| SeenNode { node, form_factor: per_area * area(node), offset: DVec2::ZERO };
+        if per_area > 0.0 {
+            seen.extend(source.roots.iter().map(seen_of));
+        }
+    }
+
+    /// What a point sees of a reflector that it touches: in the limit the whole cone meets the reflector at the point.
+    fn see_contact(&self, source: u32, form_factor: f64, from: &Viewpoint, seen: &mut Vec<SeenNode>) {
+        if let Some(leaf) = self.gather.leaf_under(source, from.position, from.up, from.inward) {
+            seen.push(SeenNode { node: leaf, form_factor, offset: self.offset(leaf, from.position) });
+        }
+    }
+
+    /// What a point sees of a reflector that nothing hides.
+    fn see_whole(&self, source: &Source, from: &Viewpoint, seen: &mut Vec<SeenNode>) {
+        for &root in &source.roots {
+            let outline = self.gather.solution.elements.outline(root);
+            self.open_whole(root, form_factor_at(from.position, from.up, outline), from, seen);
+        }
+    }
+
+    /// Adds a node that nothing hides; opens it where its linear light is not good enough. As the plane has the mean and the
+    /// slope of the light, what it misplaces is only what the point's view of the node is not linear by.
+    fn open_whole(&self, node: NodeId, form_factor: f64, from: &Viewpoint, seen: &mut Vec<SeenNode>) {
+        if form_factor <= SLIVER {
+            return;
+        }
+        let elements = &self.gather.solution.elements;
+        let record = &elements.nodes[node as usize];
+        let (size, distance) = (record.cell_max - record.cell_min, record.centre - from.position);
+        let curved = (size.length_squared() / 4.0 * CURVATURE / distance.length_squared()).min(1.0);
+        if elements.is_leaf(node) || self.gather.misplaced(node, form_factor) * curved <= self.gather.budget() {
+            let corners: Vec<DVec3> = elements.outline(node).iter().map(|corner| corner - from.position).collect();
+            let middle = from.position + self.mean_place(&corners, node, from);
+            seen.push(SeenNode { node, form_factor, offset: self.offset(node, middle) });
+            return;
+        }
+        for child in elements.children(node) {
+            self.open_whole(child, form_factor_at(from.position, from.up, elements.outline(child)), from, seen);
+        }
+    }
+
+    /// What a point sees of a reflector: the visible fragments, cut up along the nodes of its hierarchy.
+    fn see_fragments(&self, source: &Source, fragments: &Fragments, from: &Viewpoint, seen: &mut Vec<SeenNode>) {
+        for (fragment, form_factor) in fragments.iter() {
+            if let [root] = source.roots[..] {
+                self.open(root, fragment, form_factor, from, seen);
+                continue;
+            }
+            for &root in &source.roots {
+                let part = self.clip_to_outline(fragment, root, from);
+                if !part.is_empty() {
+                    self.open(root, &part, point_form_factor(&part, from.up), from, seen);
+                }
+            }
+        }
+    }
+
+    /// Adds a fragment, which lies within a node; opens the node where its linear light is not good enough.
+    fn open(&self, node: NodeId, fragment: &[DVec3], form_factor: f64, from: &Viewpoint, seen: &mut Vec<SeenNode>) {
+        let solution = self.gather.solution;
+        let elements = &solution.elements;
+        if form_factor <= SLIVER {
+            return; // The neighbour's, but for a rounding: there may be a wall on the border between the two.
+        }
+        if elements.is_leaf(node) || self.gather.misplaced(node, form_factor) <= self.gather.budget() {
+            let middle = from.position + self.mean_place(fragment, node, from);
+            seen.push(SeenNode { node, form_factor, offset: self.offset(node, middle) });
+            return;
+        }
+        for child in elements.children(node) {
+            let part = self.clip_to_cell(fragment, node, child, from);
+            if !part.is_empty() {
+                self.open(child, &part, point_form_factor(&part, from.up), from, seen);
+            }
+        }
+    }
+
+    /// Where a position on a node lies from the node's centre, along its patch's u and v, metres.
+    fn offset(&self, node: NodeId, position: DVec3) -> DVec2 {
+        let elements = &self.gather.solution.elements;
+        let Some(patch) = elements.patch_of(node) else { return DVec2::ZERO };
+        elements.patches[patch as usize].along(position - elements.nodes[node as usize].centre)
+    }
+
+    /// The centre of a fragment of a node, each part of it weighted by what it sends to the point; relative to the point.
+    fn mean_place(&self, fragment: &[DVec3], node: NodeId, from: &Viewpoint) -> DVec3 {
+        let elements = &self.gather.solution.elements;
+        let centre = fragment.iter().sum::<DVec3>() / fragment.len() as f64;
+        let Some(patch) = elements.patch_of(node) else { return centre };
+        let normal = elements.patches[patch as usize].normal();
+        let (mut weighted, mut total) = (DVec3::ZERO, 0.0);
+        for (i, &corner) in fragment.iter().enumerate() {
+            let next = fragment[(i + 1) % fragment.len()];
+            let middle = (centre + corner + next) / 3.0;
+            let area = (corner - centre).cross(next - centre).length();
+            let weight =
+                area * (from.up.dot(middle).max(0.0) * normal.dot(middle).abs()) / middle.length_squared().powi(2);
+            weighted += middle * weight;
+            total += weight;
+        }
+        if total > 0.0 { weighted / total } else { centre }
+    }
+
+    /// The part of a fragment that lies in the outline of a patch's root.
+    fn clip_to_outline(&self, fragment: &[DVec3], node: NodeId, from: &Viewpoint) -> Vec<DVec3> {
+        let elements = &self.gather.solution.elements;
+        let outline = elements.outline(node);
+        let Some(patch) = elements.patch_of(node) else { return Vec::new() };
+        let patch = &elements.patches[patch as usize];
+        let normal = patch.normal();
+        let edges = outline.iter().enumerate().map(|(i, &corner)| {
+            let inward = normal.cross(outline[(i + 1) % outline.len()] - corner);
+            (inward, inward.dot(corner - from.position))
+        });
+        // Most patches of a polygon that was cut to pieces have nothing of a fragment: found out without copying it.
+        if edges.clone().any(|(inward, border)| fragment.iter().all(|d| inward.dot(*d) <= border)) {
+            return Vec::new();
+        }
+        let mut rest = fragment.to_vec();
+        for (inward, border) in edges {
+            let mut kept = Vec::with_capacity(rest.len() + 1);
+            clip_convex(&rest, 0.0, |d| inward.dot(d) - border, &mut kept);
+            rest = kept;
+        }
+        rest
+    }
+
+    /// The part of a fragment of `node` that lies in the cell of its child.
+    fn clip_to_cell<'b>(
+        &self,
+        fragment: &'b [DVec3],
+        node: NodeId,
+        child: NodeId,
+        from: &Viewpoint,
+    ) -> Cow<'b, [DVec3]> {
+        let elements = &self.gather.solution.elements;
+        let (parent, cell) = (&elements.nodes[node as usize], &elements.nodes[child as usize]);
+        let mut rest = Cow::Borrowed(fragment);
+        let Some(patch) = elements.patch_of(node) else { return rest };
+        let patch = &elements.patches[patch as usize];
+        let origin = patch.origin - from.position;
+        for (axis, index) in [(patch.u, 0), (patch.v, 1)] {
+            let offset = axis.dot(origin);
+            let borders = [
+                (1.0, cell.cell_min[index], parent.cell_min[index]),
+                (-1.0, cell.cell_max[index], parent.cell_max[index]),
+            ];
+            for (sign, border, outer) in borders {
+                let inside = |d: DVec3| sign * (axis.dot(d) - offset - border);
+                // Most fragments lie in one child.
+                if border != outer && rest.iter().any(|&d| inside(d) < 0.0) {
+                    let mut kept = Vec::with_capacity(rest.len() + 1);
+                    clip_convex(&rest, 0.0, inside, &mut kept);
+                    rest = Cow::Owned(kept);
+                }
+            }
+        }
+        rest
+    }
+}
