@@ -2,11 +2,11 @@
 
 use glam::Vec3;
 use rayon::prelude::*;
-use scene::{Baked, BakedElement, BakedTriangle, DiscontinuityLine, HalfEdges, Provenance, Scene, luminance};
+use scene::{Baked, BakedElement, BakedTriangle, DiscontinuityLine, HalfEdges, Provenance, Scene};
 use solver::{Gather, Solution};
 
 use crate::{
-    Discontinuity, Leaf, LeafSegment, Mesh, MeshStatistics, Progress, RankedLine, SampleQuery, discontinuities,
+    Discontinuity, Leaf, LeafSegment, Mesh, MeshStatistics, Progress, RankedLine, SampleQuery, Weight, discontinuities,
     edge_table, evaluate_samples, leaf_meshes, probe, rank, sample_table,
 };
 
@@ -15,26 +15,24 @@ use crate::{
 pub struct BakeOptions {
     /// Discontinuities that a leaf follows at most (k of Hardt & Teller 1996, section 4.2).
     pub discontinuities: u32,
-    /// Weight below which a discontinuity is not followed, W·m⁻² (w_min). None takes a fraction of the radiosity of the
-    /// brightest emitter.
+    /// How discontinuities are weighed.
+    pub weight: Weight,
+    /// Weight below which a discontinuity is not followed, in the weight's unit (w_min). None takes
+    /// [`Weight::default_minimum`].
     pub min_weight: Option<f64>,
 }
-
-/// w_min as a fraction of the luminance of the brightest emitter's radiosity where none is asked for. Three times as much
-/// costs the office a third more error; a third of it a third more triangles, and gains next to nothing.
-const RELATIVE_MIN_WEIGHT: f64 = 0.4;
 
 impl Default for BakeOptions {
     /// The paper's k.
     fn default() -> Self {
-        Self { discontinuities: 10, min_weight: None }
+        Self { discontinuities: 10, weight: Weight::default(), min_weight: None }
     }
 }
 
 /// Counts of a bake.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct BakeStatistics {
-    /// The least weight that was used, W·m⁻².
+    /// The least weight that was used, in the weight's unit.
     pub min_weight: f64,
     /// Discontinuities of at least the least weight, over all polygons.
     pub discontinuities_found: usize,
@@ -62,10 +60,10 @@ pub fn bake(
     progress: Progress<'_>,
 ) -> (Baked, BakeStatistics) {
     progress(0.0);
-    let brightest = || scene.emitters().map(|e| luminance(scene.material(e).exitance())).fold(0.0, f64::max);
-    let min_weight = options.min_weight.unwrap_or_else(|| RELATIVE_MIN_WEIGHT * brightest());
-    let found = all_discontinuities(scene, solution, min_weight);
-    let (leaves, lines) = divided_leaves(scene, solution, &found, options.discontinuities as usize);
+    let weight = options.weight;
+    let min_weight = options.min_weight.unwrap_or_else(|| weight.default_minimum(scene, solution));
+    let found = all_discontinuities(scene, solution, weight, min_weight);
+    let (leaves, lines) = divided_leaves(scene, solution, &found, weight, options.discontinuities as usize);
     let mesh = leaf_meshes(&edge_table(scene, &solution.cuts, &leaves));
 
     let gather = Gather::new(scene, solution);
@@ -112,14 +110,14 @@ pub fn bake(
 }
 
 /// The discontinuities on every polygon.
-fn all_discontinuities(scene: &Scene, solution: &Solution, min_weight: f64) -> Vec<Vec<Discontinuity>> {
+fn all_discontinuities(scene: &Scene, solution: &Solution, weight: Weight, min_weight: f64) -> Vec<Vec<Discontinuity>> {
     let half_edges = HalfEdges::new(scene);
     scene
         .polygon_ids()
         .into_par_iter()
         .map(|receiver| {
             let interactions = solution.interactions(scene, receiver);
-            discontinuities(scene, &half_edges, receiver, &interactions, min_weight)
+            discontinuities(scene, &half_edges, receiver, &interactions, weight, min_weight)
         })
         .collect()
 }
@@ -129,6 +127,7 @@ fn divided_leaves(
     scene: &Scene,
     solution: &Solution,
     found: &[Vec<Discontinuity>],
+    weight: Weight,
     count: usize,
 ) -> (Vec<Leaf>, Vec<DiscontinuityLine>) {
     let elements = &solution.elements;
@@ -139,7 +138,7 @@ fn divided_leaves(
         .into_par_iter()
         .map(|(polygon, element)| {
             let outline = elements.outline(element);
-            let ranked = rank(scene, outline, &found[polygon as usize], count);
+            let ranked = rank(scene, outline, &found[polygon as usize], weight, count);
             let segment = |line: RankedLine| LeafSegment { ends: line.ends, line: line.discontinuity };
             let segments = ranked.into_iter().map(segment).collect();
             Leaf { element, polygon, outline: outline.to_vec(), segments }
@@ -247,7 +246,7 @@ mod tests {
     #[test]
     fn triangles_fill_every_polygon_and_all_is_in_range() {
         let scene = floor_lamp_and_plate();
-        let (baked, statistics) = baked(&scene, &BakeOptions { discontinuities: 10, min_weight: Some(1.0) });
+        let (baked, statistics) = baked(&scene, &BakeOptions { min_weight: Some(1.0), ..BakeOptions::default() });
         baked.validate().unwrap();
         assert_eq!(statistics.mesh, MeshStatistics::default());
         assert_eq!(statistics.discontinuities_kept, baked.lines.len());
@@ -263,8 +262,9 @@ mod tests {
     #[test]
     fn following_discontinuities_lowers_the_error() {
         let scene = floor_lamp_and_plate();
-        let error =
-            |discontinuities| baked(&scene, &BakeOptions { discontinuities, min_weight: Some(1.0) }).0.error.rms;
+        let error = |discontinuities| {
+            baked(&scene, &BakeOptions { discontinuities, weight: Weight::Ratio, min_weight: Some(1.0) }).0.error.rms
+        };
         let (none, all) = (error(0), error(20));
         assert!(all < 0.5 * none, "{all} of {none}");
     }

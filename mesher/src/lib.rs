@@ -7,6 +7,7 @@ mod discontinuity;
 mod edge_table;
 mod facet;
 mod frame;
+mod horizon;
 mod interval;
 mod leaf_mesh;
 mod probe;
@@ -14,6 +15,7 @@ mod ranking;
 mod samples;
 #[cfg(test)]
 mod testing;
+mod weight;
 mod weld;
 
 pub use bake::{BakeOptions, BakeStatistics, bake};
@@ -24,3 +26,4 @@ pub use leaf_mesh::{Mesh, MeshStatistics, MeshTriangle, leaf_meshes};
 pub use probe::{Probes, probe};
 pub use ranking::{RankedLine, rank};
 pub use samples::{Evaluate, Progress, SampleQuery, SampleTable, evaluate_samples, sample_table};
+pub use weight::{Sweep, Weight};
