@@ -30,7 +30,7 @@ fn main() {
     println!("# The degree of interpolants\n");
     println!("Command: `cargo bench --bench degree`, {}. The figures do not depend on the", env!("CARGO_PKG_VERSION"));
     println!(
-        "machine. Errors: relative RMSE against the exact gather of the same solution at 2,000 points. Samples that"
+        "machine. Errors: relative RMSE against the exact gather of the same solution at 4,000 points. Samples that"
     );
     println!("triangles of one polygon share count once.");
     for name in SCENES {

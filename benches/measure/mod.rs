@@ -13,7 +13,7 @@ use solver::{Gather, Solution, SolveOptions, solve};
 pub const SCENES: [&str; 2] = ["cornell_box", "office"];
 
 /// Points that are looked at, spread by area.
-const POINTS: u32 = 2000;
+const POINTS: u32 = 4000;
 
 /// Distance of the points from the borders of polygons, metres: a border belongs to two polygons.
 const BORDER: f64 = 1e-4;
@@ -57,11 +57,21 @@ impl Truth {
 
     /// Root of the mean of ((E − exact) ÷ max(own, mean))², over points and colours.
     pub fn relative_rmse(&self, values: impl IntoIterator<Item = Rgb>) -> f64 {
+        let errors = self.errors(values);
+        (errors.iter().map(|error| error.length_squared()).sum::<f64>() / (3 * errors.len()) as f64).sqrt()
+    }
+
+    /// Mean of |E − exact| ÷ max(own, mean), over points and colours, on which single points have less influence.
+    pub fn mean_error(&self, values: impl IntoIterator<Item = Rgb>) -> f64 {
+        let errors = self.errors(values);
+        errors.iter().map(|error| error.abs().element_sum()).sum::<f64>() / (3 * errors.len()) as f64
+    }
+
+    fn errors(&self, values: impl IntoIterator<Item = Rgb>) -> Vec<Rgb> {
         let average = |colour: &Rgb| colour.element_sum() / 3.0;
         let mean = self.values.iter().map(average).sum::<f64>() / self.values.len() as f64;
-        let error = |(value, exact): (Rgb, &Rgb)| ((value - exact) / average(exact).max(mean)).length_squared();
-        let sum: f64 = values.into_iter().zip(&self.values).map(error).sum();
-        (sum / (3 * self.values.len()) as f64).sqrt()
+        let error = |(value, exact): (Rgb, &Rgb)| (value - exact) / average(exact).max(mean);
+        values.into_iter().zip(&self.values).map(error).collect()
     }
 }
 

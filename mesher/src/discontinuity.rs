@@ -15,7 +15,7 @@ use crate::critical_surface::{Apex, GrazingRay, Pencil, Receiver, Swath, edges};
 use crate::facet::Facets;
 use crate::horizon::{Horizon, in_front};
 use crate::interval::{Interval, Intervals, clip};
-use crate::weight::{CONTACT_FLOOR, Sweep, Weight};
+use crate::weight::{Sweep, Weight};
 
 /// A line on a receiver across which a derivative of irradiance jumps.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -70,7 +70,7 @@ pub fn discontinuities(
     let Some(target) = Receiver::new(&scene.outline(receiver), facets.tolerance) else { return Vec::new() };
     let mut search = Search {
         id: receiver,
-        floor: CONTACT_FLOOR * target.diameter,
+        floor: measure.floor_on_receiver(target.diameter),
         receiver: target,
         measure,
         min_weight,
@@ -98,7 +98,7 @@ struct Search<'a> {
     facets: Facets<'a>,
     id: u32,
     receiver: Receiver,
-    /// Least distance from blocker to receiver that weights count with, metres.
+    /// Shortest length that weights count with, metres.
     floor: f64,
     measure: Weight,
     min_weight: f64,

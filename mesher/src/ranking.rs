@@ -7,7 +7,7 @@ use scene::{LineKind, Scene};
 use crate::critical_surface::{Receiver, diameter};
 use crate::discontinuity::Discontinuity;
 use crate::horizon::Horizon;
-use crate::weight::{CONTACT_FLOOR, Weight};
+use crate::weight::Weight;
 
 /// Lines in a leaf that are nearer to each other than this fraction of its diameter are one. Parallel edges of a source
 /// and a blocker put four swaths in one plane; the fraction is far below what a mesh resolves.
@@ -44,7 +44,7 @@ pub fn rank(
         if ends[0].distance(ends[1]) <= SAME_LINE * leaf_diameter || leaf.is_on_border(ends) {
             return None;
         }
-        let floor = CONTACT_FLOOR * leaf_diameter;
+        let floor = measure.floor_in_leaf(leaf_diameter);
         let weight = match discontinuity.kind {
             LineKind::Horizon => horizon_weight(scene, discontinuity, measure, ends, floor),
             _ => measure.of_swath(discontinuity, leaf.plane.normal, part, floor),

@@ -38,19 +38,29 @@ use crate::discontinuity::Discontinuity;
 use crate::facet::Facet;
 use crate::horizon::Horizon;
 
-/// Least distance from blocker to receiver that a weight counts with, as a fraction of the diameter of the leaf (of the
+/// Least distance from blocker to receiver that a ratio counts with, as a fraction of the diameter of the leaf (of the
 /// receiver, for the weight of a whole line). At a contact the distance is 0 and every weight would be infinite. Larger
 /// lets strong distant shadows win over the contact shadows of dim sources; smaller lets contacts displace everything.
-pub(crate) const CONTACT_FLOOR: f64 = 0.01;
+const CONTACT_FLOOR: f64 = 0.01;
+
+/// Least width of a penumbra that a change counts with, as a fraction of the diameter of the leaf: the same light changes
+/// over that length at least. A leaf's interpolants cannot tell a narrower penumbra from a step, however fast light
+/// changes in it. With a tenth of it, contacts and narrow shadows displaced wide ones that were worth more.
+const PENUMBRA_FLOOR: f64 = 0.1;
+
+/// The same for a whole line, as a fraction of the diameter of the receiver, which is some ten leaves across. With ten
+/// times as much, lines that matter in small leaves were discarded.
+const LINE_PENUMBRA_FLOOR: f64 = 0.01;
 
 /// w_min of [`Weight::Ratio`] as a fraction of the luminance of the brightest emitter's radiosity where none is asked
 /// for. Three times as much costs the office a third more error; a third of it a third more triangles, and gains next to
 /// nothing.
 const RATIO_MINIMUM: f64 = 0.4;
 
-/// w_min of [`Weight::Change`] where none is asked for, as a fraction of the scene's mean irradiance per size of the
-/// scene.
-const CHANGE_MINIMUM: f64 = 0.4;
+/// w_min of [`Weight::Change`] where none is asked for, in mean irradiances of the scene per size of the scene: in an
+/// element of a tenth of the scene, the largest that the solver makes, such a change moves light by most of its mean, but
+/// only over the penumbra. XXX
+const CHANGE_MINIMUM: f64 = 8.0;
 
 /// Corners as level as this, relative to their distance from the origin, lie on one chord.
 const LEVEL: f64 = 1e-12;
@@ -84,15 +94,31 @@ impl Weight {
         }
     }
 
+    /// The shortest length that counts in a leaf of a given diameter, metres.
+    pub(crate) fn floor_in_leaf(self, diameter: f64) -> f64 {
+        match self {
+            Self::Ratio => CONTACT_FLOOR * diameter,
+            Self::Change => PENUMBRA_FLOOR * diameter,
+        }
+    }
+
+    /// The shortest length that counts for a whole line on a receiver of a given diameter, metres.
+    pub(crate) fn floor_on_receiver(self, diameter: f64) -> f64 {
+        match self {
+            Self::Ratio => CONTACT_FLOOR * diameter,
+            Self::Change => LINE_PENUMBRA_FLOOR * diameter,
+        }
+    }
+
     /// Upper bound, per unit radiosity, of the weight of every swath between a source and a blocker.
     pub(crate) fn bound(self, source: &Facet, blocker: &Facet, floor: f64) -> f64 {
-        let nearest = blocker.clearance.max(floor);
+        let (near, far) = (blocker.clearance, source.clearance);
         match self {
-            Self::Ratio => (source.centre.distance(blocker.centre) + source.radius + blocker.radius) / nearest,
-            // d_sb / d_sr is at most 1; the cosine's integral at most 2, and no more than either arc.
+            Self::Ratio => (source.centre.distance(blocker.centre) + source.radius + blocker.radius) / near.max(floor),
+            // d_sb / d_sr is at most 1; the cosine's integral at most 2, and no more than what either arc may be.
             Self::Change => {
-                let arc = (2.0 * source.radius / source.clearance).min(2.0 * blocker.radius / nearest);
-                arc.min(2.0) / (PI * nearest)
+                let turn = near.recip().min(2.0 * source.radius / (floor * far));
+                turn * 2f64.min(2.0 * source.radius / far).min(2.0 * blocker.radius / near) / PI
             }
         }
     }
@@ -142,6 +168,8 @@ pub struct Sweep {
     pub chord: [DVec3; 2],
     /// Longest that the blocker's edge can be, metres: the grazed edge, or for a vertex the diameter of its polygon.
     pub edge: f64,
+    /// Width of the source across the chord, metres.
+    pub width: f64,
     /// Sine of the angle between the planes of swath and receiver.
     pub sine: f64,
 }
@@ -157,14 +185,26 @@ impl Sweep {
             Apex::Source => from.distance(to),
             Apex::Blocker => blocker,
         };
-        Self { chord: longest_chord(outline, direction, source), edge, sine: normal.cross(receiver).length() }
+        let across = source.cross(direction);
+        let places = outline.iter().map(|corner| across.dot(*corner));
+        let (low, high) = places.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high): (f64, f64), place| {
+            (low.min(place), high.max(place))
+        });
+        Self {
+            chord: longest_chord(outline, direction, source),
+            edge,
+            width: (high - low).max(0.0),
+            sine: normal.cross(receiver).length(),
+        }
     }
 
     /// Change of irradiance per metre and unit radiosity, m⁻¹, at a point of the swath's line.
     fn change(&self, ray: GrazingRay, point: DVec3, normal: DVec3, floor: f64) -> f64 {
-        let (to_blocker, to_source) = (ray.blocker.distance(point).max(floor), ray.source.distance(point).max(floor));
+        let (to_source, between) = (ray.source.distance(point), ray.source.distance(ray.blocker));
+        // The penumbra's width is about the source's, seen through the blocker's edge.
+        let to_blocker = ray.blocker.distance(point).max(floor * between / self.width);
         let arc = cosine_arc(self.chord.map(|end| end - point), normal).min(self.edge / to_blocker);
-        self.sine * ray.source.distance(ray.blocker) / (to_blocker * to_source) * arc / PI
+        self.sine * between / (to_blocker * to_source) * arc / PI
     }
 }
 
@@ -270,7 +310,7 @@ mod tests {
             let (height, half) = (2.0, 0.05);
             let lamp = rectangle((drift - half, -half), (drift + half, half), height, true);
             let plate = rectangle((0.0, -4.0), (5.0, 4.0), lift * height, false);
-            let scene = welded(&[rectangle((-3.0, -1.0), (3.0, 1.0), 0.0, false), lamp, plate]);
+            let scene = welded(&[rectangle((-1.5, -0.5), (1.5, 0.5), 0.0, false), lamp, plate]);
             let interaction = Interaction { source: 1, radiosity: 7.0, blockers: vec![2] };
             let half_edges = HalfEdges::new(&scene);
             let found = discontinuities(&scene, &half_edges, 0, &[interaction], Weight::Change, 0.0);
@@ -291,6 +331,12 @@ mod tests {
                 .fold(0.0, f64::max);
             let weight = found.iter().map(|line| line.weight).fold(0.0, f64::max);
             assert!((weight / steepest - 1.0).abs() < 0.03, "{weight} {steepest}");
+
+            // In a leaf so large that the penumbra is a fifth of what it resolves, the change is a fifth.
+            let penumbra = 2.0 * half * lift / (1.0 - lift);
+            let resolved = found[0].sweep.change(found[0].rays[0], found[0].ends[0], DVec3::Z, 0.0);
+            let coarse = found[0].sweep.change(found[0].rays[0], found[0].ends[0], DVec3::Z, 5.0 * penumbra);
+            assert!((coarse / resolved - 0.2).abs() < 1e-9, "{coarse} {resolved}");
         }
     }
 }
