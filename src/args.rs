@@ -196,9 +196,9 @@ pub enum Backend {
 #[serde(rename_all = "lowercase")]
 pub enum WeightChoice {
     /// Distance from source to blocker over that from blocker to receiver, times the source's radiosity.
-    #[default]
     Ratio,
     /// Bound on the change of irradiance per metre on the receiver.
+    #[default]
     Change,
 }
 

@@ -69,9 +69,9 @@ const LEVEL: f64 = 1e-12;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Weight {
     /// Ratio of distances times the source's radiosity, W·m⁻² (Hardt & Teller 1996, section 4.2).
-    #[default]
     Ratio,
     /// Bound on the change of irradiance per metre, W·m⁻³ (section 7.1).
+    #[default]
     Change,
 }
 
