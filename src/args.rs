@@ -393,6 +393,7 @@ mod tests {
         assert!(refused(&["shot", "a.hlf", "-o", "a.png", "--eye", "0,0,0"]).contains("--target"));
         assert!(refused(&["shot", "a.hlf", "-o", "a.png", "--compare", "b.png"]).contains("--max-error"));
         assert!(refused(&["bake", "a.obj", "-o", "a.hlf", "--bounces", "-1"]).contains("--bounces"));
+        assert!(refused(&["bake", "a.obj", "-o", "a.hlf", "--weight", "heavy"]).contains("ratio, change"));
         assert!(refused(&["bake", "a.obj"]).contains("--output"));
         assert!(refused(&["bake", "a.obj", "-o", "a.hlf", "--tolerance", "0.01"]).contains("--tolerance"));
     }
