@@ -16,7 +16,8 @@ use viewer::{Capture, Frame, Gpu, Mode, draw_on_cpu};
 const FRAMES: usize = 41;
 
 /// The parameters that the paper states for its office.
-const OF_THE_PAPER: [&str; 6] = ["--link-error", "0.1", "--discontinuities", "10", "--min-weight", "100"];
+const OF_THE_PAPER: [&str; 8] =
+    ["--link-error", "0.1", "--discontinuities", "10", "--weight", "ratio", "--min-weight", "100"];
 
 fn main() {
     println!("# The paper's figures and ours\n");

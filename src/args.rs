@@ -73,7 +73,11 @@ pub struct LightFlags {
     /// Largest number of discontinuities that one leaf follows (the paper's k)
     #[arg(long, value_name = "K", allow_negative_numbers = true)]
     pub discontinuities: Option<u32>,
-    /// Smallest weight, W/m², that a discontinuity must have to be followed (the paper's w_min) [default: from the brightest emitter]
+    /// How the strength of discontinuities is measured
+    #[arg(long, value_enum, default_value_t)]
+    pub weight: WeightChoice,
+    /// Smallest weight that a discontinuity must have to be followed (the paper's w_min), W/m² for --weight ratio, W/m³
+    /// for change [default: from the scene's light]
     #[arg(long, value_name = "W", value_parser = non_negative, allow_hyphen_values = true)]
     pub min_weight: Option<f64>,
     /// Irradiance, W/m², that one link may misplace [default: from the scene's mean irradiance]
@@ -86,7 +90,14 @@ const TOLERANCE: f64 = 0.01;
 
 impl Default for LightFlags {
     fn default() -> Self {
-        Self { tolerance: TOLERANCE, bounces: None, discontinuities: None, min_weight: None, link_error: None }
+        Self {
+            tolerance: TOLERANCE,
+            bounces: None,
+            discontinuities: None,
+            weight: WeightChoice::default(),
+            min_weight: None,
+            link_error: None,
+        }
     }
 }
 
@@ -198,6 +209,17 @@ pub enum Backend {
     Gpu,
     /// The CPU.
     Cpu,
+}
+
+/// How the strength of a discontinuity is measured.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, ValueEnum)]
+#[serde(rename_all = "lowercase")]
+pub enum WeightChoice {
+    /// Distance from source to blocker over that from blocker to receiver, times the source's radiosity.
+    Ratio,
+    /// Bound on the change of irradiance per metre on the receiver.
+    #[default]
+    Change,
 }
 
 /// How `probe` finds irradiance.
@@ -405,6 +427,7 @@ mod tests {
         assert!(refused(&["shot", "a.hlf", "-o", "a.png", "--eye", "0,0,0"]).contains("--target"));
         assert!(refused(&["shot", "a.hlf", "-o", "a.png", "--compare", "b.png"]).contains("--max-error"));
         assert!(refused(&["bake", "a.obj", "-o", "a.hlf", "--bounces", "-1"]).contains("--bounces"));
+        assert!(refused(&["bake", "a.obj", "-o", "a.hlf", "--weight", "heavy"]).contains("ratio, change"));
         assert!(refused(&["bake", "a.obj"]).contains("--output"));
         assert!(refused(&["bake", "a.obj", "-o", "a.hlf", "--tolerance", "0.01"]).contains("--tolerance"));
     }

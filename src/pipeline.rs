@@ -1,11 +1,11 @@
 //! Scene → Solution → Baked, with the counts and seconds of every stage.
 
-use mesher::{BakeOptions, Control};
+use mesher::{BakeOptions, Control, Weight};
 use scene::{Baked, BakedError, Provenance, Scene};
 use serde::Serialize;
 use solver::{Solution, SolveOptions};
 
-use crate::args::LightFlags;
+use crate::args::{LightFlags, WeightChoice};
 use crate::progress::Stage;
 
 /// The program as a bake's provenance names it.
@@ -28,6 +28,10 @@ pub fn bake(scene: &Scene, flags: &LightFlags) -> (Baked, BakeReport) {
     let options = BakeOptions {
         tolerance: flags.tolerance,
         discontinuities: flags.discontinuities.unwrap_or(defaults.discontinuities),
+        weight: match flags.weight {
+            WeightChoice::Ratio => Weight::Ratio,
+            WeightChoice::Change => Weight::Change,
+        },
         min_weight: flags.min_weight,
         ..defaults
     };
@@ -71,6 +75,7 @@ fn provenance(solution: &Solution, options: &BakeOptions, report: &BakeReport, m
             option(BOUNCES, bounces),
             option(LINK_ERROR, solution.link_error.to_string()),
             option("discontinuities", options.discontinuities.to_string()),
+            option("weight", options.weight.name().to_owned()),
             option("min-weight", min_weight.to_string()),
         ],
         statistics: vec![

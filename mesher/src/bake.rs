@@ -6,7 +6,7 @@
 
 use glam::Vec3;
 use rayon::prelude::*;
-use scene::{Baked, BakedElement, BakedError, BakedTriangle, HalfEdges, Provenance, Rgb, Scene, luminance};
+use scene::{Baked, BakedElement, BakedError, BakedTriangle, HalfEdges, Provenance, Rgb, Scene};
 use solver::{NodeId, Solution};
 
 use crate::fine_mesh::FineMesh;
@@ -14,7 +14,7 @@ use crate::probe::{colour_mean, percentile};
 use crate::refinement::worst;
 use crate::reflected_light::{Exchange, ReflectedLight};
 use crate::residual::{ResidualPoint, residual};
-use crate::{Discontinuity, Leaf, Mesh, MeshStatistics, Progress, discontinuities};
+use crate::{Discontinuity, Leaf, Mesh, MeshStatistics, Progress, Weight, discontinuities};
 
 /// What a bake is asked for.
 #[derive(Clone, Debug, PartialEq)]
@@ -24,16 +24,14 @@ pub struct BakeOptions {
     pub tolerance: f64,
     /// Discontinuities that a leaf follows at most (k of Hardt & Teller 1996, section 4.2).
     pub discontinuities: u32,
-    /// Weight below which a discontinuity is not followed, W·m⁻² (w_min). None takes a fraction of the radiosity of the
-    /// brightest emitter.
+    /// How discontinuities are weighed.
+    pub weight: Weight,
+    /// Weight below which a discontinuity is not followed, in the weight's unit (w_min). None takes
+    /// [`Weight::default_minimum`], in proportion to the tolerance.
     pub min_weight: Option<f64>,
     /// With more triangles than this a bake is not refined further; the last one with fewer is kept if there is one.
     pub max_triangles: usize,
 }
-
-/// w_min as a fraction of the luminance of the brightest emitter's radiosity at a tolerance of 1 % where none is asked for.
-/// Three times as much costs the office a third more error; a third of it a third more triangles, and gains next to nothing.
-const RELATIVE_MIN_WEIGHT: f64 = 0.4;
 
 /// The share of the tolerance that the interpolation of emitters' light, and as much again that of reflectors' light, may use
 /// up in the first round, as probes see it. Probes miss what lies between them, and the sum of bounces what each is off by:
@@ -74,7 +72,13 @@ const RESIDUAL_SHARE: f64 = 0.02;
 impl Default for BakeOptions {
     /// One percent, and the paper's k.
     fn default() -> Self {
-        Self { tolerance: 0.01, discontinuities: 10, min_weight: None, max_triangles: usize::MAX }
+        Self {
+            tolerance: 0.01,
+            discontinuities: 10,
+            weight: Weight::default(),
+            min_weight: None,
+            max_triangles: usize::MAX,
+        }
     }
 }
 
@@ -103,7 +107,7 @@ pub struct Bake {
 pub struct BakeStatistics {
     /// Rounds of meshing and measurement.
     pub rounds: u32,
-    /// The least weight that was used, W·m⁻².
+    /// The least weight that was used, in the weight's unit.
     pub min_weight: f64,
     /// Discontinuities of at least the least weight, over all polygons.
     pub discontinuities_found: usize,
@@ -123,11 +127,10 @@ pub struct BakeStatistics {
 
 /// Bakes a solved scene.
 pub fn bake(scene: &Scene, solution: Solution, options: &BakeOptions, control: Control<'_>) -> Bake {
-    let brightest = || scene.emitters().map(|e| luminance(scene.material(e).exitance())).fold(0.0, f64::max);
-    let relative = RELATIVE_MIN_WEIGHT * options.tolerance / BakeOptions::default().tolerance;
-    let min_weight = options.min_weight.unwrap_or_else(|| relative * brightest());
+    let relative = options.tolerance / BakeOptions::default().tolerance;
+    let min_weight = options.min_weight.unwrap_or_else(|| relative * options.weight.default_minimum(scene, &solution));
     (control.progress)(0.0);
-    let found = all_discontinuities(scene, &solution, min_weight);
+    let found = all_discontinuities(scene, &solution, options.weight, min_weight);
     let mut rounds = Rounds {
         scene,
         options,
@@ -231,10 +234,16 @@ impl Rounds<'_> {
                 break;
             }
             if self.reflected.refine(&mut self.solution, &divided) {
-                fine = FineMesh::new(self.scene, &self.solution, &self.found, self.options.discontinuities as usize);
+                fine = self.fine_mesh();
             }
         }
         fine
+    }
+
+    /// The mesh of the solution's leaves as they are.
+    fn fine_mesh(&self) -> FineMesh {
+        let BakeOptions { discontinuities, weight, .. } = *self.options;
+        FineMesh::new(self.scene, &self.solution, &self.found, weight, discontinuities as usize)
     }
 
     /// Irradiance at the samples of a mesh, W·m⁻².
@@ -244,8 +253,7 @@ impl Rounds<'_> {
 
     /// Divides leaves until light from emitters is interpolated well enough.
     fn mesh_emitted(&mut self) -> FineMesh {
-        let count = self.options.discontinuities as usize;
-        let mut fine = FineMesh::new(self.scene, &self.solution, &self.found, count);
+        let mut fine = self.fine_mesh();
         for _ in 0..MESHES {
             let mut leaves: Vec<(NodeId, f64)> = fine.leaves.iter().map(|leaf| (leaf.element, 0.0)).collect();
             for (triangle, (error, emitted)) in fine.probe_emitted(self.scene, &self.solution).into_iter().enumerate() {
@@ -264,7 +272,7 @@ impl Rounds<'_> {
             for leaf in divided {
                 self.solution.subdivide(leaf);
             }
-            fine = FineMesh::new(self.scene, &self.solution, &self.found, count);
+            fine = self.fine_mesh();
         }
         fine
     }
@@ -355,14 +363,14 @@ fn mean_reflectance(scene: &Scene, solution: &Solution) -> f64 {
 }
 
 /// The discontinuities on every polygon.
-fn all_discontinuities(scene: &Scene, solution: &Solution, min_weight: f64) -> Vec<Vec<Discontinuity>> {
+fn all_discontinuities(scene: &Scene, solution: &Solution, weight: Weight, min_weight: f64) -> Vec<Vec<Discontinuity>> {
     let half_edges = HalfEdges::new(scene);
     scene
         .polygon_ids()
         .into_par_iter()
         .map(|receiver| {
             let interactions = solution.interactions(scene, receiver);
-            discontinuities(scene, &half_edges, receiver, &interactions, min_weight)
+            discontinuities(scene, &half_edges, receiver, &interactions, weight, min_weight)
         })
         .collect()
 }
@@ -470,8 +478,13 @@ mod tests {
     fn following_discontinuities_saves_triangles() {
         let scene = floor_lamp_and_plate();
         let triangles = |discontinuities| {
-            let options =
-                BakeOptions { tolerance: 1e-3, discontinuities, min_weight: Some(1.0), ..BakeOptions::default() };
+            let options = BakeOptions {
+                tolerance: 1e-3,
+                discontinuities,
+                weight: Weight::Ratio,
+                min_weight: Some(1.0),
+                ..BakeOptions::default()
+            };
             let (baked, statistics) = baked(&scene, &options);
             assert!(baked.error.holds);
             statistics.triangles

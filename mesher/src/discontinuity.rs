@@ -5,7 +5,7 @@
 //! it casts a gap; what is left of one event may be several segments.
 //!
 //! What we do differently: sources are whole polygons, not the links' elements, so that a line does not depend on how
-//! far the solver divided its source; and a bound on the weight of section 4.2 is tested before a swath is built.
+//! far the solver divided its source; and a bound on the weight is tested before a swath is built.
 
 use glam::DVec3;
 use scene::{HalfEdges, LineKind, Plane, Scene};
@@ -13,8 +13,9 @@ use solver::Interaction;
 
 use crate::critical_surface::{Apex, GrazingRay, Pencil, Receiver, Swath, edges};
 use crate::facet::Facets;
+use crate::horizon::{Horizon, in_front};
 use crate::interval::{Interval, Intervals, clip};
-use crate::ranking::{CONTACT_FLOOR, Horizon, swath_weight};
+use crate::weight::{Sweep, Weight};
 
 /// A line on a receiver across which a derivative of irradiance jumps.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -36,13 +37,16 @@ pub struct Discontinuity {
     pub rays: [GrazingRay; 2],
     /// Luminance of the source's radiosity, W·m⁻².
     pub radiosity: f64,
-    /// Weight of the whole event on this receiver, W·m⁻² (section 4.2); see [`rank`](crate::rank) for a leaf's.
+    /// What a swath's light and shadow sweep over; nothing for a horizon line.
+    pub sweep: Sweep,
+    /// Weight of the whole event on this receiver, W·m⁻² or W·m⁻³ as [`Weight`] has it; see [`rank`](crate::rank) for a
+    /// leaf's.
     pub weight: f64,
 }
 
-/// The discontinuities of weight at least `min_weight` (W·m⁻²) that the interactions of a receiver cause on it.
+/// The discontinuities of weight at least `min_weight` that the interactions of a receiver cause on it.
 ///
-/// The weight is that of a whole event on the whole receiver, so that all its leaves agree on which lines there are.
+/// The weight, by the given measure, is that of a whole event on the whole receiver, so that all its leaves agree on which lines there are.
 /// `half_edges` must be the scene's own. What an interaction does not list as a blocker stops no light of its source.
 /// Interactions that name polygons which do not exist are passed over. The order is that of the interactions, within
 /// one of them by event, within an event along the line.
@@ -51,6 +55,7 @@ pub fn discontinuities(
     half_edges: &HalfEdges,
     receiver: u32,
     interactions: &[Interaction],
+    measure: Weight,
     min_weight: f64,
 ) -> Vec<Discontinuity> {
     let count = scene.polygons.len() as u32;
@@ -65,8 +70,9 @@ pub fn discontinuities(
     let Some(target) = Receiver::new(&scene.outline(receiver), facets.tolerance) else { return Vec::new() };
     let mut search = Search {
         id: receiver,
-        floor: CONTACT_FLOOR * target.diameter,
+        floor: measure.floor_on_receiver(target.diameter),
         receiver: target,
+        measure,
         min_weight,
         found: Vec::new(),
         events: 0,
@@ -92,8 +98,9 @@ struct Search<'a> {
     facets: Facets<'a>,
     id: u32,
     receiver: Receiver,
-    /// Least distance from blocker to receiver that weights count with, metres.
+    /// Shortest length that weights count with, metres.
     floor: f64,
+    measure: Weight,
     min_weight: f64,
     found: Vec<Discontinuity>,
     events: u32,
@@ -111,6 +118,8 @@ struct Case {
     plane: Plane,
     /// The source's corners, without those that lie on a straight side: nothing changes where light leaves them.
     outline: Vec<DVec3>,
+    /// The part of the outline in front of the receiver.
+    front: Vec<DVec3>,
     /// Everything that may stand in a swath.
     occluders: Vec<u32>,
     /// The occluders that may cause a discontinuity of sufficient weight.
@@ -144,16 +153,15 @@ impl Search<'_> {
         };
         let occluders: Vec<u32> = interaction.blockers.iter().copied().filter(is_between).collect();
         let can_matter = |&blocker: &u32| {
-            let blocker = self.facets.get(blocker);
-            let longest = facet.centre.distance(blocker.centre) + facet.radius + blocker.radius;
-            radiosity * longest >= self.min_weight * blocker.clearance.max(self.floor)
+            radiosity * self.measure.bound(&facet, self.facets.get(blocker), self.floor) >= self.min_weight
         };
         let strong: Vec<u32> = occluders.iter().copied().filter(can_matter).collect();
         for &blocker in &strong {
             self.blocker_of[blocker as usize] = number;
         }
         let outline = without_flat_corners(&self.facets.corners(source).collect::<Vec<_>>(), tolerance);
-        Some(Case { number, source, radiosity, plane: facet.plane, outline, occluders, strong })
+        let front = in_front(&outline, &self.receiver.plane);
+        Some(Case { number, source, radiosity, plane: facet.plane, outline, front, occluders, strong })
     }
 
     /// Swaths between the source's vertices and the blockers' silhouette edges.
@@ -167,10 +175,10 @@ impl Search<'_> {
                 let edge = [self.facets.start(half_edge), self.facets.end(half_edge)];
                 for &apex in &case.outline {
                     let pencil = Pencil { apex, edge, at: Apex::Source };
-                    if let Some(rays) = self.landing(case, &pencil)
+                    if let Some((rays, sweep)) = self.landing(case, blocker, &pencil)
                         && self.facets.is_silhouette(half_edge, apex)
                     {
-                        self.trace(case, blocker, &pencil, Intervals::from(rays));
+                        self.trace(case, blocker, &pencil, sweep, Intervals::from(rays));
                     }
                 }
             }
@@ -188,9 +196,9 @@ impl Search<'_> {
                 let apex = self.facets.start(half_edge);
                 for edge in edges(&case.outline) {
                     let pencil = Pencil { apex, edge, at: Apex::Blocker };
-                    if let Some(rays) = self.landing(case, &pencil) {
+                    if let Some((rays, sweep)) = self.landing(case, blocker, &pencil) {
                         let rays = self.facets.silhouette_corner(half_edge, edge, rays);
-                        self.trace(case, blocker, &pencil, rays);
+                        self.trace(case, blocker, &pencil, sweep, rays);
                     }
                 }
             }
@@ -198,22 +206,38 @@ impl Search<'_> {
     }
 
     /// The rays of a pencil that could reach the receiver, if the line where they meet it divides it and is strong
-    /// enough. The ratio of distances is that of heights over the receiver, h_sb / h_br, of which one is constant and the
-    /// other linear in the ray's parameter: it is largest at one of the ends, and so is the weight (but for the floor).
-    fn landing(&self, case: &Case, pencil: &Pencil) -> Option<Interval> {
+    /// enough; and what they sweep over.
+    fn landing(&self, case: &Case, blocker: u32, pencil: &Pencil) -> Option<(Interval, Sweep)> {
         let rays = pencil.landing(&case.plane, &self.receiver)?;
         let ends = rays.map(|u| pencil.point(u, &self.receiver.plane));
-        let divides = ends[0].distance(ends[1]) > self.facets.tolerance && !self.receiver.is_on_border(ends);
-        (divides && self.weight(case, pencil, rays, ends) >= self.min_weight).then_some(rays)
+        if ends[0].distance(ends[1]) <= self.facets.tolerance || self.receiver.is_on_border(ends) {
+            return None;
+        }
+        let diameter = 2.0 * self.facets.get(blocker).radius;
+        let sweep = Sweep::new(pencil, &case.front, case.plane.normal, self.receiver.plane.normal, diameter);
+        (self.piece(case, blocker, pencil, sweep, rays).weight >= self.min_weight).then_some((rays, sweep))
     }
 
-    fn weight(&self, case: &Case, pencil: &Pencil, rays: Interval, ends: [DVec3; 2]) -> f64 {
-        let weight = |i: usize| swath_weight(case.radiosity, pencil.ray(rays[i]), ends[i], self.floor);
-        weight(0).max(weight(1))
+    /// A piece of the line in which a swath meets the receiver, weighed by itself.
+    fn piece(&self, case: &Case, blocker: u32, pencil: &Pencil, sweep: Sweep, rays: Interval) -> Discontinuity {
+        let line = Discontinuity {
+            kind: if pencil.at == Apex::Source { LineKind::VertexEdge } else { LineKind::EdgeVertex },
+            receiver: self.id,
+            source: case.source,
+            blocker,
+            event: self.events,
+            ends: rays.map(|u| pencil.point(u, &self.receiver.plane)),
+            rays: rays.map(|u| pencil.ray(u)),
+            radiosity: case.radiosity,
+            sweep,
+            weight: 0.0,
+        };
+        let weight = self.measure.of_swath(&line, self.receiver.plane.normal, [0.0, 1.0], self.floor);
+        Discontinuity { weight, ..line }
     }
 
     /// Takes out of a swath what is stopped on its way and records the rest.
-    fn trace(&mut self, case: &Case, blocker: u32, pencil: &Pencil, mut rays: Intervals) {
+    fn trace(&mut self, case: &Case, blocker: u32, pencil: &Pencil, sweep: Sweep, mut rays: Intervals) {
         let Some(swath) = Swath::new(*pencil, self.facets.tolerance) else { return };
         for &occluder in &case.occluders {
             if rays.is_empty() {
@@ -221,12 +245,9 @@ impl Search<'_> {
             }
             self.stop(case, occluder, &swath, &mut rays);
         }
-        let kind = if pencil.at == Apex::Source { LineKind::VertexEdge } else { LineKind::EdgeVertex };
         let first = self.found.len();
         for piece in rays.iter() {
-            let ends = piece.map(|u| pencil.point(u, &self.receiver.plane));
-            let weight = self.weight(case, pencil, piece, ends);
-            self.record(case, kind, blocker, ends, piece.map(|u| pencil.ray(u)), weight);
+            self.record(self.piece(case, blocker, pencil, sweep, piece));
         }
         self.close_event(first);
     }
@@ -269,7 +290,7 @@ impl Search<'_> {
         let tolerance = self.facets.tolerance;
         let Some(line) = self.facets.section(self.id, &case.plane, false) else { return };
         let Some(horizon) = Horizon::new(&case.outline, &case.plane, &self.receiver.plane) else { return };
-        if case.radiosity * horizon.weight(line, self.floor) < self.min_weight {
+        if case.radiosity * self.measure.of_horizon(&horizon, line, self.floor) < self.min_weight {
             return;
         }
         let section = |&occluder: &u32| self.facets.section(occluder, &case.plane, true);
@@ -296,24 +317,25 @@ impl Search<'_> {
                 let corner = horizon.nearest_corner(end);
                 GrazingRay { source: corner, blocker: corner }
             });
-            let weight = case.radiosity * horizon.weight(ends, self.floor);
-            self.record(case, LineKind::Horizon, case.source, ends, rays, weight);
+            self.record(Discontinuity {
+                kind: LineKind::Horizon,
+                receiver: self.id,
+                source: case.source,
+                blocker: case.source,
+                event: self.events,
+                ends,
+                rays,
+                radiosity: case.radiosity,
+                sweep: Sweep::default(),
+                weight: case.radiosity * self.measure.of_horizon(&horizon, ends, self.floor),
+            });
         }
         self.close_event(first);
     }
 
-    fn record(
-        &mut self,
-        case: &Case,
-        kind: LineKind,
-        blocker: u32,
-        ends: [DVec3; 2],
-        rays: [GrazingRay; 2],
-        weight: f64,
-    ) {
-        if ends[0].distance(ends[1]) > self.facets.tolerance {
-            let (receiver, source, radiosity, event) = (self.id, case.source, case.radiosity, self.events);
-            self.found.push(Discontinuity { kind, receiver, source, blocker, event, ends, rays, radiosity, weight });
+    fn record(&mut self, piece: Discontinuity) {
+        if piece.ends[0].distance(piece.ends[1]) > self.facets.tolerance {
+            self.found.push(piece);
         }
     }
 

@@ -10,7 +10,7 @@ use solver::{Gather, NodeId, Solution};
 
 use crate::probe::{colour_mean, probe_point};
 use crate::{
-    Discontinuity, Leaf, LeafSegment, Mesh, RankedLine, SampleQuery, SampleTable, edge_table, evaluate_samples,
+    Discontinuity, Leaf, LeafSegment, Mesh, RankedLine, SampleQuery, SampleTable, Weight, edge_table, evaluate_samples,
     leaf_meshes, rank, sample_table,
 };
 
@@ -27,8 +27,8 @@ pub(crate) struct FineMesh {
 
 impl FineMesh {
     /// Meshes the solution's leaves with the `count` strongest discontinuities of each.
-    pub fn new(scene: &Scene, solution: &Solution, found: &[Vec<Discontinuity>], count: usize) -> Self {
-        let (leaves, lines) = divided_leaves(scene, solution, found, count);
+    pub fn new(scene: &Scene, solution: &Solution, found: &[Vec<Discontinuity>], weight: Weight, count: usize) -> Self {
+        let (leaves, lines) = divided_leaves(scene, solution, found, weight, count);
         let mesh = leaf_meshes(&edge_table(scene, &solution.cuts, &leaves));
         let gather = Gather::new(scene, solution);
         let table = sample_table(scene, &leaves, &mesh, &|polygon, position| gather.contact(polygon, position));
@@ -85,6 +85,7 @@ fn divided_leaves(
     scene: &Scene,
     solution: &Solution,
     found: &[Vec<Discontinuity>],
+    weight: Weight,
     count: usize,
 ) -> (Vec<Leaf>, Vec<DiscontinuityLine>) {
     let elements = &solution.elements;
@@ -95,7 +96,7 @@ fn divided_leaves(
         .into_par_iter()
         .map(|(polygon, element)| {
             let outline = elements.outline(element);
-            let ranked = rank(scene, outline, &found[polygon as usize], count);
+            let ranked = rank(scene, outline, &found[polygon as usize], weight, count);
             let segment = |line: RankedLine| LeafSegment { ends: line.ends, line: line.discontinuity };
             let segments = ranked.into_iter().map(segment).collect();
             Leaf { element, polygon, outline: outline.to_vec(), segments }

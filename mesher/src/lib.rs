@@ -8,6 +8,7 @@ mod edge_table;
 mod facet;
 mod fine_mesh;
 mod frame;
+mod horizon;
 mod interval;
 mod leaf_mesh;
 mod probe;
@@ -19,6 +20,7 @@ mod residual;
 mod samples;
 #[cfg(test)]
 mod testing;
+mod weight;
 mod weld;
 
 pub use bake::{Bake, BakeOptions, BakeStatistics, Control, bake};
@@ -28,3 +30,4 @@ pub use edge_table::{EdgeTable, Leaf, LeafSegment, edge_table};
 pub use leaf_mesh::{Mesh, MeshStatistics, MeshTriangle, leaf_meshes};
 pub use ranking::{RankedLine, rank};
 pub use samples::{Evaluate, Progress, SampleQuery, SampleTable, evaluate_samples, sample_table};
+pub use weight::{Sweep, Weight};

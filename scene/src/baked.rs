@@ -91,7 +91,7 @@ pub struct DiscontinuityLine {
     pub source: u32,
     /// Blocking polygon; the source itself for a horizon line.
     pub blocker: u32,
-    /// Rank weight, W·m⁻² (section 4.2).
+    /// Rank weight, W·m⁻² (Hardt & Teller 1996, section 4.2) or W·m⁻³ (7.1), as the options of the bake say.
     pub weight: f32,
     /// Ends on the receiver, metres.
     pub ends: [Vec3; 2],

@@ -57,14 +57,14 @@ fn cuboid(low: DVec3, high: DVec3) -> Vec<Vec<DVec3>> {
 
 /// The discontinuities on polygon 0 of light from polygon 1 past all others, of radiosity 1 and any weight.
 fn search(outlines: &[Vec<DVec3>]) -> Vec<Discontinuity> {
-    search_above(outlines, 0.0)
+    search_above(outlines, Weight::Ratio, 0.0)
 }
 
-fn search_above(outlines: &[Vec<DVec3>], min_weight: f64) -> Vec<Discontinuity> {
+fn search_above(outlines: &[Vec<DVec3>], measure: Weight, min_weight: f64) -> Vec<Discontinuity> {
     let scene = welded(outlines);
     let blockers = (2..outlines.len() as u32).collect();
     let interactions = [Interaction { source: 1, radiosity: 1.0, blockers }];
-    discontinuities(&scene, &HalfEdges::new(&scene), 0, &interactions, min_weight)
+    discontinuities(&scene, &HalfEdges::new(&scene), 0, &interactions, measure, min_weight)
 }
 
 fn of_kind(lines: &[Discontinuity], kind: LineKind) -> Vec<[DVec3; 2]> {
@@ -96,8 +96,10 @@ fn degenerate_input_has_no_discontinuities() {
     let scene = welded(&[floor(), light.clone(), rectangle((-0.5, -0.5), (0.5, 0.5), 1.0, false)]);
     let half_edges = HalfEdges::new(&scene);
     let interaction = |source, blockers: &[u32]| Interaction { source, radiosity: 1.0, blockers: blockers.to_vec() };
-    let count = |receiver, interaction| discontinuities(&scene, &half_edges, receiver, &[interaction], 0.0).len();
-    assert!(discontinuities(&scene, &half_edges, 0, &[], 0.0).is_empty());
+    let count = |receiver, interaction| {
+        discontinuities(&scene, &half_edges, receiver, &[interaction], Weight::Ratio, 0.0).len()
+    };
+    assert!(discontinuities(&scene, &half_edges, 0, &[], Weight::Ratio, 0.0).is_empty());
     assert_eq!(count(0, interaction(1, &[])), 0);
     assert_eq!(count(0, interaction(7, &[2])), 0);
     assert_eq!(count(7, interaction(1, &[2])), 0);
@@ -107,10 +109,12 @@ fn degenerate_input_has_no_discontinuities() {
     assert_eq!(count(0, interaction(1, &[2])), 32);
 
     let empty = Scene::default();
-    assert!(discontinuities(&empty, &HalfEdges::new(&empty), 0, &[interaction(1, &[2])], 0.0).is_empty());
+    assert!(
+        discontinuities(&empty, &HalfEdges::new(&empty), 0, &[interaction(1, &[2])], Weight::Ratio, 0.0).is_empty()
+    );
     let mut collapsed = scene.clone();
     collapsed.vertices = vec![DVec3::ZERO; scene.vertices.len()];
-    assert!(discontinuities(&collapsed, &half_edges, 0, &[interaction(1, &[2])], 0.0).is_empty());
+    assert!(discontinuities(&collapsed, &half_edges, 0, &[interaction(1, &[2])], Weight::Ratio, 0.0).is_empty());
     // A light that shines away, and one below the floor.
     let mut away = light;
     away.reverse();
@@ -150,7 +154,7 @@ fn square_light_and_square_blocker_by_hand() {
     }
     let events: Vec<u32> = found.iter().map(|line| line.event).collect();
     assert_eq!(events, (0..32).collect::<Vec<_>>());
-    assert!(search_above(&outlines, 1.0 + 1e-9).is_empty());
+    assert!(search_above(&outlines, Weight::Ratio, 1.0 + 1e-9).is_empty());
 
     // The same with a back for the blocker.
     let mut two_sided = outlines.clone();
@@ -328,7 +332,7 @@ fn an_edge_counts_when_only_one_of_its_faces_is_listed() {
     let half_edges = HalfEdges::new(&scene);
     let on_ridge = |blockers: Vec<u32>| {
         let interactions = [Interaction { source: 1, radiosity: 1.0, blockers }];
-        let found = discontinuities(&scene, &half_edges, 0, &interactions, 0.0);
+        let found = discontinuities(&scene, &half_edges, 0, &interactions, Weight::Ratio, 0.0);
         let grazes = |line: &&Discontinuity| line.rays.iter().all(|ray| ray.blocker.x == 0.0 && ray.blocker.z == 0.6);
         let is_swath = |line: &&Discontinuity| line.kind == LineKind::VertexEdge && grazes(line);
         found.iter().filter(is_swath).count()
@@ -375,16 +379,16 @@ fn a_source_corner_under_another_polygon_is_hidden_behind_it() {
 fn a_larger_least_weight_gives_a_subset() {
     let mut outlines = blocker_plane();
     outlines.extend(cuboid(v(0.6, -0.4, 0.0), v(0.9, 0.1, 0.4)));
-    let all = search(&outlines);
-    for min_weight in [0.1, 0.5, 1.0, 2.0, 10.0, 1e3] {
-        let some: Vec<Discontinuity> =
-            search_above(&outlines, min_weight).iter().map(|line| Discontinuity { event: 0, ..*line }).collect();
-        let expected: Vec<Discontinuity> = all
-            .iter()
-            .filter(|line| line.weight >= min_weight)
-            .map(|line| Discontinuity { event: 0, ..*line })
-            .collect();
-        assert_eq!(some, expected);
+    for measure in [Weight::Ratio, Weight::Change] {
+        let all = search_above(&outlines, measure, 0.0);
+        for min_weight in [0.01, 0.03, 0.1, 0.2, 0.3, 0.5, 1.0, 2.0, 10.0, 1e3] {
+            let unnumbered = |line: &Discontinuity| Discontinuity { event: 0, ..*line };
+            let some: Vec<Discontinuity> =
+                search_above(&outlines, measure, min_weight).iter().map(unnumbered).collect();
+            let expected: Vec<Discontinuity> =
+                all.iter().filter(|line| line.weight >= min_weight).map(unnumbered).collect();
+            assert_eq!(some, expected, "{measure:?} {min_weight}");
+        }
     }
 }
 
@@ -443,7 +447,7 @@ proptest! {
             }
             for t in [0.1, 0.5, 0.9] {
                 let point = line.ends[0].lerp(line.ends[1], t);
-                let ray = crate::ranking::ray_between(line, t);
+                let ray = crate::weight::ray_between(line, t);
                 let (there, here) = (ray.blocker - ray.source, point - ray.source);
                 prop_assert!(there.cross(here).length() < 1e-8 && there.length() < here.length() + 1e-9);
                 prop_assert!(there.dot(here) > 0.0);
