@@ -56,6 +56,9 @@ pub struct LeafGather<'a> {
 
 struct Source {
     polygon: u32,
+    /// The patches of it that links name, ascending. What hides another from the whole leaf is no blocker of any link,
+    /// so the gather must not look there at all.
+    patches: Vec<u32>,
     /// Each with the number that its polygon has among the leaf's blockers.
     blockers: Vec<(usize, Blocker)>,
 }
@@ -118,10 +121,12 @@ impl<'a> Gather<'a> {
         let elements = &self.solution.elements;
         let polygon = elements.polygon_of(leaf).unwrap_or_default();
         let mut pairs: Vec<(u32, u32)> = Vec::new(); // (source polygon, blocker), and (source, source) for each source
+        let mut patches: Vec<u32> = Vec::new();
         let mut node = leaf;
         loop {
             for link in self.solution.links_of(node) {
                 let LinkSource::Node(source) = link.source;
+                patches.extend(elements.patch_of(source));
                 let Some(source) = elements.polygon_of(source) else { continue };
                 pairs.push((source, source));
                 pairs.extend(self.solution.blockers.get(link.blockers).iter().map(|&blocker| (source, blocker)));
@@ -132,7 +137,7 @@ impl<'a> Gather<'a> {
             }
             node = parent;
         }
-        self.leaf_gather(polygon, pairs)
+        self.leaf_gather(polygon, pairs, patches)
     }
 
     /// Irradiance at a position in the plane of a polygon, W·m⁻²; `inward` is the direction in the plane from whose
@@ -144,18 +149,23 @@ impl<'a> Gather<'a> {
         }
     }
 
-    fn leaf_gather(&'a self, polygon: u32, mut pairs: Vec<(u32, u32)>) -> LeafGather<'a> {
+    fn leaf_gather(&'a self, polygon: u32, mut pairs: Vec<(u32, u32)>, mut patches: Vec<u32>) -> LeafGather<'a> {
         pairs.sort_unstable();
         pairs.dedup();
+        patches.sort_unstable();
+        patches.dedup();
         let mut blockers: Vec<u32> = pairs.iter().filter(|(s, b)| s != b).map(|&(_, blocker)| blocker).collect();
         blockers.sort_unstable();
         blockers.dedup();
-        let sources = pairs.chunk_by(|a, b| a.0 == b.0).map(|group| self.source(group, &blockers)).collect();
+        let sources = pairs.chunk_by(|a, b| a.0 == b.0).map(|group| self.source(group, &blockers, &patches)).collect();
         LeafGather { gather: self, polygon, sources, blocker_count: blockers.len() }
     }
 
-    fn source(&self, group: &[(u32, u32)], all: &[u32]) -> Source {
+    fn source(&self, group: &[(u32, u32)], all: &[u32], patches: &[u32]) -> Source {
         let polygon = group[0].0;
+        let own = self.solution.patches_of(polygon);
+        let linked =
+            patches.partition_point(|&patch| patch < own.start)..patches.partition_point(|&patch| patch < own.end);
         let blockers = group
             .iter()
             .filter(|(source, blocker)| source != blocker)
@@ -164,7 +174,7 @@ impl<'a> Gather<'a> {
                 Some((number, Blocker::before(&self.geometry, &self.geometry.plane(polygon), blocker)?))
             })
             .collect();
-        Source { polygon, blockers }
+        Source { polygon, patches: patches[linked].to_vec(), blockers }
     }
 
     /// The leaf of a polygon that contains a position; of several one on the side of `above`, and of these the one that
@@ -251,45 +261,52 @@ impl LeafGather<'_> {
                 }
             }
             let form_factor = fragments.measure(up);
-            total += self.light(source.polygon, &fragments, form_factor, touches, &from);
+            total += self.light(source, &fragments, form_factor, touches, &from);
         }
         total
     }
 
     /// Irradiance from the visible fragments of one source.
-    fn light(&self, source: u32, fragments: &Fragments, form_factor: f64, touches: bool, from: &Viewpoint) -> Rgb {
+    fn light(&self, source: &Source, fragments: &Fragments, form_factor: f64, touches: bool, from: &Viewpoint) -> Rgb {
         let (gather, solution) = (self.gather, self.gather.solution);
-        let material = gather.scene.material(source);
-        let light = form_factor * material.exitance();
-        if !solution.reflects() || material.reflectance == Rgb::ZERO {
-            return light;
-        }
+        let polygon = source.polygon;
+        let material = gather.scene.material(polygon);
+        let reflects = solution.reflects() && material.reflectance != Rgb::ZERO;
         let mut reflected = Rgb::ZERO;
         if touches {
             // In the limit the whole cone meets the source at the point itself.
-            if let Some(leaf) = gather.leaf_under(source, from.position, from.up, from.inward) {
+            if reflects && let Some(leaf) = gather.leaf_under(polygon, from.position, from.up, from.inward) {
                 let at = solution.reflected_irradiance(leaf, from.position);
                 reflected = at * form_factor;
             }
-        } else {
-            let budget = gather.budget / luminance(material.reflectance).max(1e-3);
-            for (fragment, form_factor) in fragments.iter() {
-                if solution.is_one_patch(source) {
-                    let root = solution.elements.patches[solution.first_patch[source as usize] as usize].root;
+            return form_factor * material.exitance() + reflected * material.reflectance;
+        }
+        let all_linked = source.patches.len() == solution.patches_of(polygon).len();
+        if all_linked && !reflects {
+            return form_factor * material.exitance();
+        }
+        let budget = gather.budget / luminance(material.reflectance).max(1e-3);
+        let mut linked_form_factor = 0.0;
+        for (fragment, form_factor) in fragments.iter() {
+            for &patch in &source.patches {
+                let root = solution.elements.patches[patch as usize].root;
+                if solution.is_one_patch(polygon) {
                     self.open(root, fragment, form_factor, budget, from, &mut reflected);
                     continue;
                 }
-                for root in solution.patch_roots(source) {
-                    let part = self.clip_to_outline(fragment, root, from);
-                    if part.is_empty() {
-                        continue;
-                    }
-                    let form_factor = point_form_factor(&part, from.up);
+                let part = self.clip_to_outline(fragment, root, from);
+                if part.is_empty() {
+                    continue;
+                }
+                let form_factor = point_form_factor(&part, from.up);
+                linked_form_factor += form_factor;
+                if reflects {
                     self.open(root, &part, form_factor, budget, from, &mut reflected);
                 }
             }
         }
-        light + reflected * material.reflectance
+        let form_factor = if all_linked { form_factor } else { linked_form_factor };
+        form_factor * material.exitance() + reflected * material.reflectance
     }
 
     /// Adds form factor × irradiance over a fragment, which lies within a node; opens the node where its linear

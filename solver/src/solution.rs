@@ -156,10 +156,14 @@ impl Solution {
         &self.links[self.first_link[node as usize] as usize..self.first_link[node as usize + 1] as usize]
     }
 
+    /// Ids of a polygon's patches.
+    pub fn patches_of(&self, polygon: u32) -> std::ops::Range<u32> {
+        self.first_patch[polygon as usize]..self.first_patch[polygon as usize + 1]
+    }
+
     /// Root nodes of a polygon's patches, in order.
     pub fn patch_roots(&self, polygon: u32) -> impl Iterator<Item = NodeId> {
-        let range = self.first_patch[polygon as usize]..self.first_patch[polygon as usize + 1];
-        range.map(|patch| self.elements.patches[patch as usize].root)
+        self.patches_of(polygon).map(|patch| self.elements.patches[patch as usize].root)
     }
 
     /// Whether a polygon was not cut.
