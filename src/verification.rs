@@ -69,6 +69,11 @@ impl Comparison {
         self.square().max(0.0).sqrt()
     }
 
+    /// Relative difference, root mean square over the colours; the reference's noise is in it.
+    fn size(&self) -> f64 {
+        (self.difference().length_squared() / 3.0).sqrt()
+    }
+
     /// Signed relative error, averaged over the colours.
     pub fn signed(&self) -> f64 {
         self.difference().element_sum() / 3.0
@@ -81,8 +86,7 @@ impl Comparison {
 
     /// Whether the relative error exceeds a limit by more than noise explains.
     fn is_beyond(&self, limit: f64) -> bool {
-        let root_mean_square = (self.difference().length_squared() / 3.0).sqrt();
-        root_mean_square > limit + BEYOND * (self.variance().element_sum() / 3.0).sqrt()
+        self.size() > limit + BEYOND * (self.variance().element_sum() / 3.0).sqrt()
     }
 }
 
@@ -93,8 +97,8 @@ pub struct Verification {
     pub relative_rmse: f64,
     /// Standard error of the relative RMSE, from the scatter over the points: noise and choice of points together.
     pub standard_error: f64,
-    /// Percentiles of the relative error over the points, each point's noise removed by itself. What is left of it
-    /// makes the high ones larger than the truth.
+    /// Percentiles over the points of the relative difference from the reference. Its noise is in them, since it can
+    /// be removed from a mean but not from a single point: they are upper bounds.
     pub percentiles: Percentiles,
     /// Mean of the signed relative error over points and colours; positive is too bright.
     pub bias: f64,
@@ -114,7 +118,7 @@ pub struct Verification {
     pub worst: Vec<usize>,
 }
 
-/// Percentiles of the relative error.
+/// Percentiles of the relative difference, root mean square over the colours.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Percentiles {
     /// Median.
@@ -140,10 +144,12 @@ pub fn verify(points: &[Comparison], tolerance: f64, worst: usize) -> Verificati
     let relative_rmse = mean_square.max(0.0).sqrt();
     let mut order: Vec<usize> = (0..points.len()).collect();
     order.sort_by(|&a, &b| points[b].error().total_cmp(&points[a].error()).then(a.cmp(&b)));
-    // The smallest error that at least the given part of the points does not exceed.
+    let mut differences: Vec<f64> = points.iter().map(Comparison::size).collect();
+    differences.sort_by(f64::total_cmp);
+    // The smallest difference that at least the given part of the points does not exceed.
     let percentile = |part: f64| {
-        let above = points.len() - (part * points.len() as f64).ceil() as usize;
-        order.get(above).map_or(0.0, |&index| points[index].error())
+        let rank = (part * points.len() as f64).ceil() as usize;
+        differences.get(rank.saturating_sub(1)).copied().unwrap_or_default()
     };
     let limit = PERCENTILE_FACTOR * tolerance;
     let beyond = points.iter().filter(|point| point.is_beyond(limit)).count();

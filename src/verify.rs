@@ -136,12 +136,13 @@ fn write_table(to: &mut dyn Write, points: &[SurfacePoint], comparisons: &[Compa
 struct Report {
     relative_rmse: f64,
     standard_error: f64,
+    /// Percentiles of the difference from the reference, whose noise is in them.
     p50: f64,
     p95: f64,
     p99: f64,
     bias: f64,
     bias_standard_error: f64,
-    /// Relative standard error of the reference at one point, root mean square; removed from the errors.
+    /// Relative standard error of the reference at one point, root mean square; removed from the relative RMSE.
     noise: f64,
     points: usize,
     /// Paths a point, on average.
@@ -224,10 +225,10 @@ impl Report {
         let mut text = format!(
             "compared         {light} at {} points, {} paths each\n\
              relative RMSE    {} ± {}; tolerance {}: {}\n\
-             percentiles      {} at 50 %, {} at 95 %, {} at 99 %\n\
+             percentiles      {} at 50 %, {} at 95 %, {} at 99 %, noise in them\n\
              beyond {:<9} {} points for certain, {:.0} may be: {}\n\
              bias             {:+.3} % ± {}\n\
-             noise            {} at a point, removed from the errors above\n\
+             noise            {} at a point, removed from the relative RMSE\n\
              verdict          {}\n\
              worst points     irradiance and reference ± standard error are means over the colours, W/m²\n\
              {:>10} {:>10} {:>10} {:>9} {:>24} {:>17} {:>7}  object\n",
