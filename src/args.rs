@@ -18,6 +18,9 @@ const LARGEST_SIDE: u32 = 16_384;
 /// Largest exposure value of either sign: beyond it 2^EV leaves the numbers that a picture is made of.
 const LARGEST_EV: f64 = 64.0;
 
+/// Most paths at a point: a quarter of a minute for one point, and 0.02 % of its light.
+const MOST_SAMPLES: i64 = 1 << 24;
+
 /// Bakes light: diffuse global illumination as a piecewise-quadratic description on every surface.
 #[derive(Debug, Parser)]
 #[command(name = "halflight", version, infer_long_args = false, after_help = EXIT_CODES)]
@@ -27,7 +30,8 @@ pub struct Flags {
     pub command: Command,
 }
 
-const EXIT_CODES: &str = "Exit codes: 0 done, 1 failed, 2 wrong usage, 3 a comparison did not hold, 130 interrupted.";
+const EXIT_CODES: &str =
+    "Exit codes: 0 done, 1 failed, 2 wrong usage, 3 a comparison or verification did not hold, 130 interrupted.";
 
 /// The subcommands, each in a file of its own.
 #[derive(Debug, Subcommand)]
@@ -40,6 +44,8 @@ pub enum Command {
     View(ViewFlags),
     /// Print the irradiance at points
     Probe(ProbeFlags),
+    /// Hold a bake against an independent, path-traced reference
+    Verify(VerifyFlags),
     /// Print what a file holds
     Info(InfoFlags),
 }
@@ -181,12 +187,52 @@ pub struct ProbeFlags {
     /// Where the irradiance goes; stdout without it
     #[arg(short, long, value_name = "OUT.csv")]
     pub output: Option<PathBuf>,
-    /// How irradiance is found: the bake's interpolants, or an exact gather from the solution at each point
+    /// How irradiance is found: the bake's interpolants, an exact gather from the solution at each point, or paths,
+    /// which know nothing of the solver
     #[arg(long, value_enum, default_value_t = Method::Interpolant)]
     pub method: Method,
+    /// Paths at each point, with --method path [default: 4096]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=MOST_SAMPLES), allow_negative_numbers = true)]
+    pub samples: Option<u32>,
     /// Interreflections followed; 0 is direct light only [default: to convergence, or as a .hlf file was baked]
     #[arg(long, value_name = "N", allow_negative_numbers = true)]
     pub bounces: Option<u32>,
+}
+
+/// `halflight verify`.
+#[derive(Debug, Args)]
+pub struct VerifyFlags {
+    /// Bake to verify, or a scene, which is baked first
+    #[arg(value_name = "SCENE|OUT.hlf")]
+    pub input: PathBuf,
+    /// Points compared, spread by area over all surfaces
+    #[arg(long, value_name = "N", default_value_t = 2000, value_parser = clap::value_parser!(u32).range(100..=1_000_000), allow_negative_numbers = true)]
+    pub points: u32,
+    /// Paths at each point [default: as many as the tolerance asks for]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=MOST_SAMPLES), allow_negative_numbers = true)]
+    pub samples: Option<u32>,
+    /// Relative RMSE that the bake must keep, as a fraction (0.01 is 1 %), with the 99th percentile five times that
+    /// [default: the tolerance that it was baked for]
+    #[arg(long, value_name = "F", value_parser = fraction, allow_hyphen_values = true)]
+    pub tolerance: Option<f64>,
+    /// Seed of points and paths; another one is another, independent opinion
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub seed: u64,
+    /// Where a picture of the error goes: blue is too dark, red too bright, grey within a quarter of the tolerance
+    #[arg(long, value_name = "IMAGE.png", value_parser = png_path)]
+    pub picture: Option<PathBuf>,
+    /// The point of view of the picture
+    #[command(flatten)]
+    pub camera: CameraFlags,
+    /// Width and height of the picture, pixels
+    #[arg(long, value_name = "WxH", default_value = "960x720", value_parser = size, allow_hyphen_values = true)]
+    pub size: (u32, u32),
+    /// Where every point, its light and its reference go
+    #[arg(short, long, value_name = "TABLE.csv")]
+    pub output: Option<PathBuf>,
+    /// Print one JSON object on stdout
+    #[arg(long)]
+    pub json: bool,
 }
 
 /// `halflight info`.
@@ -229,6 +275,8 @@ pub enum Method {
     Interpolant,
     /// Backprojection of every source at the point itself.
     Gather,
+    /// Unbiased path tracing from the point, with its standard error.
+    Path,
 }
 
 /// A fixed exposure, or one metered from the picture.
@@ -302,6 +350,11 @@ fn positive(text: &str) -> Result<f64, String> {
     if value > 0.0 { Ok(value) } else { Err("must be more than 0".into()) }
 }
 
+fn fraction(text: &str) -> Result<f64, String> {
+    let value = number(text)?;
+    if value > 0.0 && value < 1.0 { Ok(value) } else { Err("must lie between 0 and 1, such as 0.01 for 1 %".into()) }
+}
+
 fn opening_angle(text: &str) -> Result<f64, String> {
     let value = number(text)?;
     if value > 0.0 && value < 180.0 { Ok(value) } else { Err("must lie between 0 and 180 degrees".into()) }
@@ -337,6 +390,11 @@ fn image_path(text: &str) -> Result<PathBuf, String> {
         Some(_) => Ok(path),
         None => Err("the name must end in .png or .exr".into()),
     }
+}
+
+fn png_path(text: &str) -> Result<PathBuf, String> {
+    let path = PathBuf::from(text);
+    if ImageKind::of(&path) == Some(ImageKind::Png) { Ok(path) } else { Err("the name must end in .png".into()) }
 }
 
 fn mode() -> impl TypedValueParser<Value = Mode> {
@@ -430,6 +488,22 @@ mod tests {
         assert!(refused(&["bake", "a.obj", "-o", "a.hlf", "--weight", "heavy"]).contains("ratio, change"));
         assert!(refused(&["bake", "a.obj"]).contains("--output"));
         assert!(refused(&["bake", "a.obj", "-o", "a.hlf", "--tolerance", "0.01"]).contains("--tolerance"));
+    }
+
+    #[test]
+    fn what_cannot_be_verified_is_refused_by_the_name_of_its_flag() {
+        for value in ["0", "1", "-0.01", "nan", "1e999", "much"] {
+            assert!(refused(&["verify", "a.hlf", "--tolerance", value]).contains("--tolerance"), "{value}");
+        }
+        for value in ["0", "-5", "99", "1e3", "9999999999"] {
+            assert!(refused(&["verify", "a.hlf", "--points", value]).contains("--points"), "{value}");
+        }
+        for value in ["0", "-1", "99999999"] {
+            assert!(refused(&["verify", "a.hlf", "--samples", value]).contains("--samples"), "{value}");
+            assert!(refused(&["probe", "a.hlf", "--points", "a.csv", "--samples", value]).contains("--samples"));
+        }
+        assert!(refused(&["verify", "a.hlf", "--picture", "a.exr"]).contains(".png"));
+        assert!(refused(&["verify", "a.hlf", "--seed", "-1"]).contains("'-1'"));
     }
 
     #[test]

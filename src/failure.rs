@@ -9,7 +9,7 @@ use thiserror::Error;
 pub enum Outcome {
     /// Everything was done.
     Done,
-    /// Everything was done, and a comparison did not hold.
+    /// Everything was done, and a comparison or verification did not hold.
     Differs,
 }
 

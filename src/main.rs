@@ -1,11 +1,13 @@
 //! Halflight's command line: flags → validated options → one subcommand → one exit.
 //!
-//! Exit codes: 0 done, 1 failed, 2 wrong usage, 3 a comparison did not hold, 130 interrupted.
+//! Exit codes: 0 done, 1 failed, 2 wrong usage, 3 a comparison or verification did not hold, 130 interrupted.
 
 mod args;
 mod bake;
 mod compare;
+mod error_picture;
 mod failure;
+mod ground_truth;
 mod info;
 mod input;
 mod output;
@@ -14,6 +16,8 @@ mod probe;
 mod progress;
 mod report;
 mod shot;
+mod verification;
+mod verify;
 mod view;
 
 use std::process::ExitCode;
@@ -59,6 +63,7 @@ fn run(command: Command) -> Result<Outcome> {
         Command::Shot(flags) => shot::run(&flags, &outputs),
         Command::View(flags) => view::run(&flags, &outputs),
         Command::Probe(flags) => probe::run(&flags, &outputs),
+        Command::Verify(flags) => verify::run(&flags, &outputs),
         Command::Info(flags) => info::run(&flags),
     }
 }

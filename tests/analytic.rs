@@ -1,21 +1,11 @@
 //! Scenes whose light has a closed form. The form factors' own are beside the solver.
 
 use std::f64::consts::PI;
-use std::fmt::Write;
-use std::path::{Path, PathBuf};
 
 use glam::DVec3;
 
-use crate::fixture::{data, folder, run, text};
+use crate::fixture::{box_faces, data, folder, probe, run, text, write_points, write_scene};
 use crate::reference::Table;
-
-/// The irradiance that `probe` finds; all points meet a surface.
-fn probe(scene: &Path, points: &Path, options: &[&str]) -> Vec<DVec3> {
-    let output = points.with_extension("out.csv");
-    run(&[&["probe", text(scene), "--points", text(points), "-o", text(&output)], options].concat());
-    let found: Option<Vec<_>> = Table::read(&output).colours("e").into_iter().collect();
-    found.expect("every point meets a surface").into_iter().map(DVec3::from).collect()
-}
 
 /// A light, a floor and a blocker between them: the visible part of the light is a polygon.
 #[test]
@@ -33,51 +23,6 @@ fn a_polygon_light_with_a_polygon_blocker() {
         let error = (found - truth).abs().max_element() / truth.x.max(1e-3 * mean);
         assert!(error <= 1e-6, "point {i}: {found} for {truth}");
     }
-}
-
-/// The faces of a box, seen from inside when `inward`.
-fn box_faces(low: DVec3, high: DVec3, inward: bool, faces: &[usize]) -> Vec<[DVec3; 4]> {
-    let corner = |i: usize| {
-        let pick = |bit: usize, low: f64, high: f64| if i & bit == 0 { low } else { high };
-        DVec3::new(pick(1, low.x, high.x), pick(2, low.y, high.y), pick(4, low.z, high.z))
-    };
-    // Counter-clockwise from inside: floor, ceiling, front, back, left, right.
-    const FACES: [[usize; 4]; 6] = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]];
-    faces
-        .iter()
-        .map(|&face| {
-            let mut corners = FACES[face].map(corner);
-            if !inward {
-                corners.reverse();
-            }
-            corners
-        })
-        .collect()
-}
-
-/// Writes an OBJ of quads, each with the name of its material.
-fn write_scene(folder: &Path, materials: &str, quads: &[([DVec3; 4], &str)]) -> PathBuf {
-    std::fs::write(folder.join("scene.mtl"), materials).unwrap();
-    let mut obj = String::from("mtllib scene.mtl\n");
-    for (corners, material) in quads {
-        for corner in corners {
-            writeln!(obj, "v {} {} {}", corner.x, corner.y, corner.z).unwrap();
-        }
-        writeln!(obj, "usemtl {material}\nf -4 -3 -2 -1").unwrap();
-    }
-    let path = folder.join("scene.obj");
-    std::fs::write(&path, obj).unwrap();
-    path
-}
-
-fn write_points(folder: &Path, points: impl Iterator<Item = (DVec3, DVec3)>) -> PathBuf {
-    let mut csv = String::from("x,y,z,nx,ny,nz\n");
-    for (p, n) in points {
-        writeln!(csv, "{},{},{},{},{},{}", p.x, p.y, p.z, n.x, n.y, n.z).unwrap();
-    }
-    let path = folder.join("points.csv");
-    std::fs::write(&path, csv).unwrap();
-    path
 }
 
 /// A closed room whose walls all emit and reflect alike: E = B = M/(1−ρ) everywhere, here 1/(1−½).

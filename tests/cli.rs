@@ -54,8 +54,13 @@ fn a_missing_file() {
     assert!(said.contains("missing.obj") && said.contains("check the path"), "{said}");
     assert!(names(folder.path()).is_empty());
     let bake = folder.path().join("missing.hlf");
-    for arguments in [vec!["info"], vec!["view"], vec!["shot", "-o", "a.png"], vec!["probe", "--points", text(&scene)]]
-    {
+    for arguments in [
+        vec!["info"],
+        vec!["view"],
+        vec!["shot", "-o", "a.png"],
+        vec!["verify"],
+        vec!["probe", "--points", text(&scene)],
+    ] {
         let said = fails(1, &[arguments.as_slice(), &[text(&bake)]].concat());
         assert!(said.contains("missing."), "{said}");
     }
@@ -96,7 +101,7 @@ fn a_scene_that_does_not_emit() {
     let folder = folder();
     let (scene, output) = (scene(folder.path(), |obj| obj), folder.path().join("out"));
     std::fs::write(folder.path().join("blocker_plane.mtl"), "newmtl floor\nnewmtl blocker\nnewmtl light\n").unwrap();
-    for arguments in [["bake", "hlf"], ["shot", "png"]] {
+    for arguments in [["bake", "hlf"], ["shot", "png"], ["verify", "csv"]] {
         let output = output.with_extension(arguments[1]);
         let said = fails(1, &[arguments[0], text(&scene), "-o", text(&output)]);
         assert!(said.contains("scene.obj") && said.contains("Ke 10 10 10"), "{said}");
@@ -156,6 +161,15 @@ fn wrong_flags_are_wrong_usage() {
         ("shot a.hlf -o a.png --compare b.png --max-error -1", "--max-error"),
         ("probe a.hlf", "--points"),
         ("probe a.hlf --points a.csv --method guess", "gather"),
+        ("probe a.hlf --points a.csv --samples 64", "--method path"),
+        ("verify a.hlf --tolerance 0", "between 0 and 1"),
+        ("verify a.hlf --tolerance 1", "--tolerance"),
+        ("verify a.hlf --tolerance -0.01", "--tolerance"),
+        ("verify a.hlf --points 10", "--points"),
+        ("verify a.hlf --samples 0", "--samples"),
+        ("verify a.hlf --picture a.exr", ".png"),
+        ("verify a.hlf --eye 0,0,0", "--target"),
+        ("verify", "<SCENE|OUT.hlf>"),
         ("polish a.hlf", "polish"),
         ("info a.hlf --no-such-flag", "--no-such-flag"),
     ] {
@@ -164,6 +178,9 @@ fn wrong_flags_are_wrong_usage() {
     }
     let said = fails(2, &["shot", text(office()), "-o", "a.png", "--camera", "nobody"]);
     assert!(said.contains("--camera nobody") && said.contains("its cameras are camera"), "{said}");
+    let said =
+        fails(2, &["verify", text(cornell_box()), "--tolerance", "0.1", "--picture", "a.png", "--camera", "nobody"]);
+    assert!(said.contains("--camera nobody"), "{said}");
     let points = data("reference/cornell_box.csv");
     let said = fails(2, &["probe", text(cornell_box()), "--points", text(&points), "--bounces", "1"]);
     assert!(said.contains("--method gather"), "{said}");
@@ -240,12 +257,13 @@ fn a_point_that_meets_nothing_has_empty_fields_and_is_counted() {
     let folder = folder();
     let points = folder.path().join("points.csv");
     std::fs::write(&points, "x,y,z,nx,ny,nz\n1,1,0,0,0,1\n1,1,0.5,0,0,1\n1,1,0,0,0,-1\n").unwrap();
-    for method in ["interpolant", "gather"] {
+    for method in ["interpolant", "gather", "path"] {
         let scene = data("scenes/blocker_plane.obj");
         let found = run(&["probe", text(&scene), "--points", text(&points), "--method", method]);
         let table = String::from_utf8(found.stdout).unwrap();
         let lines: Vec<&str> = table.lines().collect();
-        assert_eq!(lines[0], "x,y,z,nx,ny,nz,er,eg,eb");
+        assert!(lines[0].starts_with("x,y,z,nx,ny,nz,er,eg,eb"), "{table}");
+        assert_eq!(lines[0].ends_with("eb,sr,sg,sb"), method == "path");
         assert!(!lines[1].ends_with(",,,"), "{table}");
         assert!(lines[2].ends_with(",,,") && lines[3].ends_with(",,,"), "{table}");
         assert!(String::from_utf8(found.stderr).unwrap().contains("2 of 3 points"));

@@ -1,11 +1,15 @@
 //! What the tests share: the program, the data, a folder to write to, and bakes that are made once.
 
+use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::process::Output;
 use std::sync::OnceLock;
 
 use assert_cmd::Command;
+use glam::DVec3;
 use tempfile::TempDir;
+
+use crate::reference::Table;
 
 /// A file below data/.
 pub fn data(path: &str) -> PathBuf {
@@ -74,5 +78,59 @@ fn bake(scene: &str, name: &str, options: &[&str]) -> PathBuf {
     let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name).with_extension("hlf");
     let scene = data(&format!("scenes/{scene}.obj"));
     run(&[&["bake", text(&scene), "-o", text(&path)], options].concat());
+    path
+}
+
+/// The irradiance that `probe` finds; all points meet a surface.
+pub fn probe(scene: &Path, points: &Path, options: &[&str]) -> Vec<DVec3> {
+    let output = points.with_extension("out.csv");
+    run(&[&["probe", text(scene), "--points", text(points), "-o", text(&output)], options].concat());
+    let found: Option<Vec<_>> = Table::read(&output).colours("e").into_iter().collect();
+    found.expect("every point meets a surface").into_iter().map(DVec3::from).collect()
+}
+
+/// The faces of a box, seen from inside when `inward`.
+pub fn box_faces(low: DVec3, high: DVec3, inward: bool, faces: &[usize]) -> Vec<[DVec3; 4]> {
+    let corner = |i: usize| {
+        let pick = |bit: usize, low: f64, high: f64| if i & bit == 0 { low } else { high };
+        DVec3::new(pick(1, low.x, high.x), pick(2, low.y, high.y), pick(4, low.z, high.z))
+    };
+    // Counter-clockwise from inside: floor, ceiling, front, back, left, right.
+    const FACES: [[usize; 4]; 6] = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]];
+    faces
+        .iter()
+        .map(|&face| {
+            let mut corners = FACES[face].map(corner);
+            if !inward {
+                corners.reverse();
+            }
+            corners
+        })
+        .collect()
+}
+
+/// Writes an OBJ of quads, each with the name of its material.
+pub fn write_scene(folder: &Path, materials: &str, quads: &[([DVec3; 4], &str)]) -> PathBuf {
+    std::fs::write(folder.join("scene.mtl"), materials).unwrap();
+    let mut obj = String::from("mtllib scene.mtl\n");
+    for (corners, material) in quads {
+        for corner in corners {
+            writeln!(obj, "v {} {} {}", corner.x, corner.y, corner.z).unwrap();
+        }
+        writeln!(obj, "usemtl {material}\nf -4 -3 -2 -1").unwrap();
+    }
+    let path = folder.join("scene.obj");
+    std::fs::write(&path, obj).unwrap();
+    path
+}
+
+/// Writes a table of points and normals.
+pub fn write_points(folder: &Path, points: impl Iterator<Item = (DVec3, DVec3)>) -> PathBuf {
+    let mut csv = String::from("x,y,z,nx,ny,nz\n");
+    for (p, n) in points {
+        writeln!(csv, "{},{},{},{},{},{}", p.x, p.y, p.z, n.x, n.y, n.z).unwrap();
+    }
+    let path = folder.join("points.csv");
+    std::fs::write(&path, csv).unwrap();
     path
 }

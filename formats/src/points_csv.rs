@@ -81,7 +81,8 @@ fn unreadable(path: &Path, error: &csv::Error) -> FormatError {
 }
 
 /// Writes a CSV table x,y,z,nx,ny,nz,er,eg,eb: the queries and the irradiance there, W·m⁻², the fields empty where there
-/// is none. Every number reads back as the same f64.
+/// is none. Where irradiance is an estimate, the columns sr,sg,sb of its standard errors follow; who looks columns up
+/// by name reads both tables alike. Every number reads back as the same f64.
 ///
 /// # Errors
 /// A stream that breaks, or lists of different lengths.
@@ -89,22 +90,33 @@ pub fn write_irradiance(
     mut to: impl Write,
     queries: &[SurfaceQuery],
     irradiance: &[Option<Rgb>],
+    standard_errors: Option<&[Option<Rgb>]>,
 ) -> Result<(), FormatError> {
-    if queries.len() != irradiance.len() {
+    if queries.len() != irradiance.len() || standard_errors.is_some_and(|errors| errors.len() != queries.len()) {
         let cause = format!("{} points have {} values", queries.len(), irradiance.len());
         return Err(io::Error::new(io::ErrorKind::InvalidInput, cause).into());
     }
-    writeln!(to, "{},er,eg,eb", COLUMNS.join(","))?;
-    for (query, irradiance) in queries.iter().zip(irradiance) {
+    writeln!(to, "{},er,eg,eb{}", COLUMNS.join(","), standard_errors.map_or("", |_| ",sr,sg,sb"))?;
+    for (index, (query, irradiance)) in queries.iter().zip(irradiance).enumerate() {
         for value in query.position.to_array().into_iter().chain(query.normal.to_array()) {
             write!(to, "{value:?},")?;
         }
-        match irradiance {
-            Some(Rgb { x: r, y: g, z: b }) => writeln!(to, "{r:?},{g:?},{b:?}")?,
-            None => writeln!(to, ",,")?,
+        write_colour(&mut to, irradiance)?;
+        if let Some(errors) = standard_errors {
+            write!(to, ",")?;
+            write_colour(&mut to, &errors[index])?;
         }
+        writeln!(to)?;
     }
     Ok(to.flush()?)
+}
+
+/// Three fields, empty where there is no colour.
+fn write_colour(to: &mut impl Write, colour: &Option<Rgb>) -> io::Result<()> {
+    match colour {
+        Some(Rgb { x: r, y: g, z: b }) => write!(to, "{r:?},{g:?},{b:?}"),
+        None => write!(to, ",,"),
+    }
 }
 
 #[cfg(test)]
@@ -153,11 +165,17 @@ mod tests {
     fn a_point_without_light_gets_empty_fields() {
         let query = SurfaceQuery { position: DVec3::ONE, normal: DVec3::Z };
         let mut text = Vec::new();
-        write_irradiance(&mut text, &[query; 2], &[None, Some(Rgb::new(0.1, 1e-30, 3e300))]).unwrap();
-        assert!(write_irradiance(io::sink(), &[query], &[]).is_err());
+        write_irradiance(&mut text, &[query; 2], &[None, Some(Rgb::new(0.1, 1e-30, 3e300))], None).unwrap();
+        assert!(write_irradiance(io::sink(), &[query], &[], None).is_err());
+        assert!(write_irradiance(io::sink(), &[query], &[None], Some(&[])).is_err());
         let text = String::from_utf8(text).unwrap();
         let point = "1.0,1.0,1.0,0.0,0.0,1.0";
         assert_eq!(text, format!("x,y,z,nx,ny,nz,er,eg,eb\n{point},,,\n{point},0.1,1e-30,3e300\n"));
+        let (mut text, light) = (Vec::new(), [None, Some(Rgb::ONE)]);
+        write_irradiance(&mut text, &[query; 2], &light, Some(&[None, Some(Rgb::ZERO)])).unwrap();
+        let text = String::from_utf8(text).unwrap();
+        let header = "x,y,z,nx,ny,nz,er,eg,eb,sr,sg,sb";
+        assert_eq!(text, format!("{header}\n{point},,,,,,\n{point},1.0,1.0,1.0,0.0,0.0,0.0\n"));
     }
 
     fn finite() -> impl Strategy<Value = f64> {
@@ -170,7 +188,7 @@ mod tests {
             let queries: Vec<_> = points.iter()
                 .map(|&p| SurfaceQuery { position: p.into(), normal: DVec3::new(1.0, p[0].sin(), 0.1) }).collect();
             let mut text = Vec::new();
-            write_irradiance(&mut text, &queries, &vec![None; queries.len()]).unwrap();
+            write_irradiance(&mut text, &queries, &vec![None; queries.len()], None).unwrap();
             prop_assert_eq!(read(&text).unwrap(), queries);
         }
 

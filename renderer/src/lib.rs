@@ -8,6 +8,6 @@ mod sequence;
 mod spherical_triangle;
 mod surface;
 
-pub use path_trace::{Estimate, PathOptions, irradiance};
+pub use path_trace::{Estimate, PathOptions, irradiance, irradiance_on};
 pub use reference::{Reference, ReferenceOptions, reference};
 pub use surface::{SurfacePoint, spread_by_area};

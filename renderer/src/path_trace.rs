@@ -14,7 +14,7 @@ use scene::{Bvh, Rgb, Scene};
 use crate::{
     emitters::{Emitters, SeenEmitters},
     sequence::{Kronecker, Stream},
-    surface::{Receiver, Surfaces},
+    surface::{Receiver, SurfacePoint, Surfaces},
 };
 
 /// Independent batches that the samples of a point are dealt into. More measure the variance better (this many to
@@ -67,6 +67,27 @@ pub fn irradiance(scene: &Scene, bvh: &Bvh, points: &[(DVec3, DVec3)], options: 
         tracer.irradiance(&receiver, options, index as u64)
     };
     points.par_iter().enumerate().map(estimate).collect()
+}
+
+/// Irradiance at points of surfaces, W·m⁻², each by as many paths as `samples` has for it, rounded up to a multiple of 32.
+///
+/// `bounces` and `seed` are those of [`PathOptions`]; `done` is called after every point, from any thread. `bvh` is
+/// [`Bvh::of_scene`] of the same scene. The result does not depend on the number of threads.
+pub fn irradiance_on(
+    scene: &Scene,
+    bvh: &Bvh,
+    points: &[SurfacePoint],
+    samples: &[u32],
+    (bounces, seed): (Option<u32>, u64),
+    done: &(dyn Fn() + Sync),
+) -> Vec<Estimate> {
+    let tracer = PathTracer::new(scene, bvh);
+    let estimate = |(index, (&point, &samples)): (usize, (&SurfacePoint, &u32))| {
+        let estimate = tracer.irradiance(&point.into(), &PathOptions { samples, bounces, seed }, index as u64);
+        done();
+        estimate
+    };
+    points.par_iter().zip(samples).enumerate().map(estimate).collect()
 }
 
 /// A scene, ready for paths.

@@ -9,7 +9,7 @@ fuzz_target!(|bytes: &[u8]| {
     std::fs::write(&path, bytes).expect("the folder is writable");
     if let Ok(queries) = formats::read_points(&path) {
         let mut text = Vec::new();
-        formats::write_irradiance(&mut text, &queries, &vec![None; queries.len()]).expect("memory takes it");
+        formats::write_irradiance(&mut text, &queries, &vec![None; queries.len()], None).expect("memory takes it");
         std::fs::write(&path, text).expect("the folder is writable");
         assert_eq!(formats::read_points(&path).expect("what was written can be read"), queries);
     }
