@@ -42,6 +42,8 @@ pub enum Command {
     Probe(ProbeFlags),
     /// Print what a file holds
     Info(InfoFlags),
+    /// Hold the program's own light against closed forms
+    Validate(ValidateFlags),
 }
 
 /// `halflight bake`.
@@ -171,6 +173,14 @@ pub struct InfoFlags {
     /// Bake or scene; a scene is described as it is, without a bake
     #[arg(value_name = "SCENE|OUT.hlf")]
     pub input: PathBuf,
+    /// Print one JSON object on stdout
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// `halflight validate`.
+#[derive(Debug, Args)]
+pub struct ValidateFlags {
     /// Print one JSON object on stdout
     #[arg(long)]
     pub json: bool,

@@ -14,6 +14,7 @@ mod probe;
 mod progress;
 mod report;
 mod shot;
+mod validate;
 mod view;
 
 use std::process::ExitCode;
@@ -60,5 +61,6 @@ fn run(command: Command) -> Result<Outcome> {
         Command::View(flags) => view::run(&flags, &outputs),
         Command::Probe(flags) => probe::run(&flags, &outputs),
         Command::Info(flags) => info::run(&flags),
+        Command::Validate(flags) => validate::run(&flags),
     }
 }
