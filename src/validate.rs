@@ -149,7 +149,7 @@ impl Report {
 fn table(cases: &[Case]) -> String {
     let row = |name: &str, numbers: [String; 3], error: &str| {
         let [published, exact, ours] = numbers;
-        format!("  {name:<34}{published:>14}{exact:>14}{ours:>14}{error:>10}")
+        format!("  {name:<34}{published:>14}{exact:>15}{ours:>15}{error:>10}")
     };
     let headings = ["published", "exact", "ours"].map(str::to_owned);
     let mut text = row("", headings, "error") + "\n";
@@ -170,13 +170,10 @@ fn table(cases: &[Case]) -> String {
     text + &format!("{within} of {} cases agree with the closed form, each within its bound\n", cases.len())
 }
 
-/// A number with ten significant digits, as many as the catalogues print.
+/// A number with ten significant digits or, from 1 on downwards, decimals, as many as the catalogues print.
 fn ten_digits(value: f64) -> String {
-    let digits = value.abs().log10().floor();
-    if !(-4.0..9.0).contains(&digits) {
-        return if value == 0.0 { "0".into() } else { format!("{value:.6e}") };
-    }
-    format!("{value:.*}", (9.0 - digits) as usize)
+    let digits = value.abs().log10().floor().max(-1.0);
+    format!("{value:.*}", (9.0 - digits).clamp(0.0, 10.0) as usize)
 }
 
 #[cfg(test)]
@@ -206,7 +203,8 @@ mod tests {
     fn numbers_have_ten_digits() {
         assert_eq!(ten_digits(0.199_824_895_7), "0.1998248957");
         assert_eq!(ten_digits(-105.781_234_567_89), "-105.7812346");
-        assert_eq!((ten_digits(0.0), ten_digits(1.5e-7)), ("0".into(), "1.500000e-7".into()));
+        assert_eq!((ten_digits(0.0), ten_digits(1.5e-7)), ("0.0000000000".into(), "0.0000001500".into()));
+        assert_eq!(ten_digits(1e12), "1000000000000");
         assert_eq!((ten_digits(f64::NAN), ten_digits(f64::INFINITY)), ("NaN".into(), "inf".into()));
     }
 }

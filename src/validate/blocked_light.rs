@@ -56,7 +56,7 @@ fn parallel() -> Vec<Case> {
     let [floor, light, blocker] = [FLOOR_HALF, LIGHT_HALF, BLOCKER_HALF].map(|half| [[-half, half]; 2]);
     let plate = reversed(facing_down(blocker[0], blocker[1], 0.5));
     let scene = floor_light_and_blocker(FLOOR_HALF, LIGHT_HALF, 1.0, &plate);
-    let lit = Lit::solve(scene, None);
+    let lit = Lit::solve(scene);
     let places = [
         ("the one point of the umbra", 0.0, 0.0),
         ("deep in the penumbra", 0.1, 0.05),
@@ -97,7 +97,7 @@ const BELOW_THE_TRIANGLE: [(f64, f64); 3] = [(0.0, 0.0), (0.1, 0.05), (-0.2, 0.3
 
 fn tilted() -> Vec<Case> {
     let (half, height) = TILTED_LIGHT;
-    let lit = Lit::solve(floor_light_and_blocker(2.0, half, height, &reversed(TRIANGLE)), None);
+    let lit = Lit::solve(floor_light_and_blocker(2.0, half, height, &reversed(TRIANGLE)));
     let points = BELOW_THE_TRIANGLE.map(|(x, y)| (DVec3::new(x, y, 0.0), DVec3::Z));
     let case = |((position, normal), found): ((DVec3, DVec3), Rgb)| {
         let [x, y] = [position.x, position.y].map(|centre| [-half - centre, half - centre]);

@@ -8,11 +8,7 @@ use solver::{Gather, Solution, SolveOptions};
 /// How far from its surface a point may lie, metres: a bake's vertices are rounded to f32.
 const REACH: f64 = 1e-5;
 
-/// The sides of a box, as [`cuboid`] lists them.
-pub const LOW_X: usize = 0;
-/// The side at the upper bound of x.
-pub const HIGH_X: usize = 1;
-/// The side at the lower bound of y.
+/// The side of a box at the lower bound of y, as [`cuboid`] lists them.
 pub const LOW_Y: usize = 2;
 /// The side at the upper bound of y.
 pub const HIGH_Y: usize = 3;
@@ -104,10 +100,14 @@ pub struct Lit {
 }
 
 impl Lit {
-    /// Solves a scene's light with the program's default options, but for the interreflections that are followed.
-    pub fn solve(scene: Scene, bounces: Option<u32>) -> Self {
-        let options = SolveOptions { bounces, ..SolveOptions::default() };
-        let solution = solver::solve(&scene, &options, &|_| ());
+    /// Solves a scene's light with the program's default options.
+    pub fn solve(scene: Scene) -> Self {
+        Self::solve_with(scene, &SolveOptions::default())
+    }
+
+    /// Solves a scene's light.
+    pub fn solve_with(scene: Scene, options: &SolveOptions) -> Self {
+        let solution = solver::solve(&scene, options, &|_| ());
         let bvh = Bvh::of_scene(&scene);
         Self { scene, solution, bvh }
     }
@@ -173,7 +173,7 @@ mod tests {
 
     #[test]
     fn a_point_beside_every_surface_is_no_number() {
-        let lit = Lit::solve(Room::default().scene(), None);
+        let lit = Lit::solve(Room::default().scene());
         assert!(lit.gather([(DVec3::ZERO, DVec3::Z)])[0].is_nan());
         assert!(interpolated(&lit.bake(), [(DVec3::ZERO, DVec3::Z)])[0].is_nan());
     }
