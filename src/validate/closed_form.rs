@@ -70,10 +70,11 @@ pub fn element_to_polygon(position: DVec3, normal: DVec3, outline: &[DVec3]) -> 
 }
 
 /// From a disk of radius `first` to a coaxial, parallel one of radius `second` at the distance `h`; with R = r/h and
-/// S = 1 + (1 + R₂²)/R₁²: F = (S − √(S² − 4 (r₂/r₁)²))/2.
+/// S = 1 + (1 + R₂²)/R₁²: F = (S − √(S² − 4 (r₂/r₁)²))/2, here without its difference of two numbers that are nearly equal.
 pub fn coaxial_disks(first: f64, second: f64, h: f64) -> f64 {
     let s = 1.0 + (1.0 + (second / h).powi(2)) / (first / h).powi(2);
-    (s - (s * s - 4.0 * (second / first).powi(2)).sqrt()) / 2.0
+    let ratio = (second / first).powi(2);
+    2.0 * ratio / (s + (s * s - 4.0 * ratio).sqrt())
 }
 
 /// The value at the upper bound less the one at the lower.
