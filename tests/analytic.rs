@@ -36,7 +36,7 @@ fn a_polygon_light_with_a_polygon_blocker() {
 }
 
 /// The faces of a box, seen from inside when `inward`.
-fn box_faces(low: DVec3, high: DVec3, inward: bool, faces: &[usize]) -> Vec<[DVec3; 4]> {
+pub fn box_faces(low: DVec3, high: DVec3, inward: bool, faces: &[usize]) -> Vec<[DVec3; 4]> {
     let corner = |i: usize| {
         let pick = |bit: usize, low: f64, high: f64| if i & bit == 0 { low } else { high };
         DVec3::new(pick(1, low.x, high.x), pick(2, low.y, high.y), pick(4, low.z, high.z))
@@ -56,7 +56,7 @@ fn box_faces(low: DVec3, high: DVec3, inward: bool, faces: &[usize]) -> Vec<[DVe
 }
 
 /// Writes an OBJ of quads, each with the name of its material.
-fn write_scene(folder: &Path, materials: &str, quads: &[([DVec3; 4], &str)]) -> PathBuf {
+pub fn write_scene(folder: &Path, materials: &str, quads: &[([DVec3; 4], &str)]) -> PathBuf {
     std::fs::write(folder.join("scene.mtl"), materials).unwrap();
     let mut obj = String::from("mtllib scene.mtl\n");
     for (corners, material) in quads {
