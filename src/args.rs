@@ -48,6 +48,8 @@ pub enum Command {
     Verify(VerifyFlags),
     /// Print what a file holds
     Info(InfoFlags),
+    /// Hold the program's own light against closed forms
+    Validate(ValidateFlags),
 }
 
 /// `halflight bake`.
@@ -61,6 +63,9 @@ pub struct BakeFlags {
     /// What the light is asked for
     #[command(flatten)]
     pub light: LightFlags,
+    /// What the bake may take
+    #[command(flatten)]
+    pub limits: LimitFlags,
     /// Print one JSON object on stdout: counts, seconds by stage, memory and measured error
     #[arg(long)]
     pub json: bool,
@@ -89,6 +94,17 @@ pub struct LightFlags {
     /// Irradiance, W/m², that one link may misplace [default: from the scene's mean irradiance]
     #[arg(long, value_name = "E", value_parser = positive, allow_hyphen_values = true)]
     pub link_error: Option<f64>,
+}
+
+/// What a bake may take: where the tolerance is not kept within it, the best bake so far is written, and the exit code is 3.
+#[derive(Clone, Copy, Debug, Default, Args)]
+pub struct LimitFlags {
+    /// Triangles beyond which the bake is not refined further
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), allow_negative_numbers = true)]
+    pub max_triangles: Option<u32>,
+    /// Seconds after which no further round of refinement begins
+    #[arg(long, value_name = "S", value_parser = positive, allow_hyphen_values = true)]
+    pub max_seconds: Option<f64>,
 }
 
 /// The error that is accepted where none is named: what no eye sees.
@@ -241,6 +257,14 @@ pub struct InfoFlags {
     /// Bake or scene; a scene is described as it is, without a bake
     #[arg(value_name = "SCENE|OUT.hlf")]
     pub input: PathBuf,
+    /// Print one JSON object on stdout
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// `halflight validate`.
+#[derive(Debug, Args)]
+pub struct ValidateFlags {
     /// Print one JSON object on stdout
     #[arg(long)]
     pub json: bool,
@@ -487,7 +511,9 @@ mod tests {
         assert!(refused(&["bake", "a.obj", "-o", "a.hlf", "--bounces", "-1"]).contains("--bounces"));
         assert!(refused(&["bake", "a.obj", "-o", "a.hlf", "--weight", "heavy"]).contains("ratio, change"));
         assert!(refused(&["bake", "a.obj"]).contains("--output"));
-        assert!(refused(&["bake", "a.obj", "-o", "a.hlf", "--tolerance", "0.01"]).contains("--tolerance"));
+        for value in ["0", "-0.01", "1", "nan", "1e-5"] {
+            assert!(refused(&["bake", "a.obj", "-o", "a.hlf", "--tolerance", value]).contains("--tolerance"));
+        }
     }
 
     #[test]

@@ -3,6 +3,7 @@
 use std::time::Instant;
 
 use anyhow::Result;
+use scene::Baked;
 use serde::Serialize;
 
 use crate::args::BakeFlags;
@@ -18,7 +19,7 @@ pub fn run(flags: &BakeFlags, outputs: &Outputs) -> Result<Outcome> {
     let output = outputs.claim(&flags.output)?;
     let (scene, import_seconds) = read_scene(&flags.scene)?;
     require_light(&flags.scene, &scene)?;
-    let (baked, mut report) = pipeline::bake(&scene, &flags.light);
+    let pipeline::Bake { baked, mut report, .. } = pipeline::bake(&scene, &flags.light, &flags.limits);
     let start = Instant::now();
     output.write(|path| formats::write_baked(path, &baked))?;
     report.seconds.import = import_seconds;
@@ -29,7 +30,21 @@ pub fn run(flags: &BakeFlags, outputs: &Outputs) -> Result<Outcome> {
     } else {
         say(summary(&report, output.path()));
     }
-    Ok(Outcome::Done)
+    if baked.error.holds {
+        return Ok(Outcome::Done);
+    }
+    say(format_args!("warning: {}", missed(&baked, flags.light.tolerance)));
+    Ok(Outcome::Differs)
+}
+
+/// Says of a bake that does not keep its tolerance what it reached, and the cure.
+pub fn missed(baked: &Baked, tolerance: f64) -> String {
+    format!(
+        "the bake does not keep --tolerance {tolerance}: it was measured at {:.2} % rms and {:.2} % at 99 %; allow it more \
+         triangles or seconds, or a larger tolerance",
+        100.0 * baked.error.rms,
+        100.0 * baked.error.p99
+    )
 }
 
 #[derive(Serialize)]

@@ -7,7 +7,8 @@ use anyhow::{Context, Result, ensure};
 use etcetera::BaseStrategy;
 use scene::{Baked, Scene};
 
-use crate::args::LightFlags;
+use crate::args::{LightFlags, LimitFlags};
+use crate::bake::missed;
 use crate::output::Outputs;
 use crate::pipeline;
 use crate::progress::{Stage, say};
@@ -71,17 +72,25 @@ fn bake_once(scene: &Scene, flags: &LightFlags, outputs: &Outputs) -> Baked {
         Ok(place) => place,
         Err(error) => {
             say(format_args!("warning: the bake will not be kept: {error:#}"));
-            return pipeline::bake(scene, flags).0;
+            return baked_anew(scene, flags);
         }
     };
     // A file that another version wrote, or a damaged one, is made anew.
     if let Ok(baked) = formats::read_baked(&place) {
         return baked;
     }
-    let (baked, _) = pipeline::bake(scene, flags);
+    let baked = baked_anew(scene, flags);
     let kept = outputs.claim(&place).and_then(|output| Ok(output.write(|path| formats::write_baked(path, &baked))?));
     if let Err(error) = kept {
         say(format_args!("warning: the bake was not kept: {error:#}"));
+    }
+    baked
+}
+
+fn baked_anew(scene: &Scene, flags: &LightFlags) -> Baked {
+    let baked = pipeline::bake(scene, flags, &LimitFlags::default()).baked;
+    if !baked.error.holds {
+        say(format_args!("warning: {}", missed(&baked, flags.tolerance)));
     }
     baked
 }

@@ -16,6 +16,7 @@ mod probe;
 mod progress;
 mod report;
 mod shot;
+mod validate;
 mod verification;
 mod verify;
 mod view;
@@ -65,5 +66,6 @@ fn run(command: Command) -> Result<Outcome> {
         Command::Probe(flags) => probe::run(&flags, &outputs),
         Command::Verify(flags) => verify::run(&flags, &outputs),
         Command::Info(flags) => info::run(&flags),
+        Command::Validate(flags) => validate::run(&flags),
     }
 }

@@ -1,11 +1,13 @@
 //! Scene → Solution → Baked, with the counts and seconds of every stage.
 
+use std::time::Instant;
+
 use mesher::{BakeOptions, Control, Weight};
 use scene::{Baked, BakedError, Provenance, Scene};
 use serde::Serialize;
 use solver::{Solution, SolveOptions};
 
-use crate::args::{LightFlags, WeightChoice};
+use crate::args::{LightFlags, LimitFlags, WeightChoice};
 use crate::progress::Stage;
 
 /// The program as a bake's provenance names it.
@@ -19,8 +21,19 @@ pub fn solve(scene: &Scene, flags: &LightFlags) -> (Solution, f64) {
     (solution, stage.end())
 }
 
-/// Bakes a scene.
-pub fn bake(scene: &Scene, flags: &LightFlags) -> (Baked, BakeReport) {
+/// A bake and what is known of how it was made.
+pub struct Bake {
+    /// The bake, with its provenance.
+    pub baked: Baked,
+    /// The solution with the elements and the light of the bake.
+    pub solution: Solution,
+    /// Counts and seconds.
+    pub report: BakeReport,
+}
+
+/// Bakes a scene within limits. What is limited is looked at between rounds.
+pub fn bake(scene: &Scene, flags: &LightFlags, limits: &LimitFlags) -> Bake {
+    let start = Instant::now();
     let (solution, solve_seconds) = solve(scene, flags);
     let links = solution.links.len();
     let stage = Stage::start("mesh");
@@ -33,9 +46,10 @@ pub fn bake(scene: &Scene, flags: &LightFlags) -> (Baked, BakeReport) {
             WeightChoice::Change => Weight::Change,
         },
         min_weight: flags.min_weight,
-        ..defaults
+        max_triangles: limits.max_triangles.map_or(defaults.max_triangles, |most| most as usize),
     };
-    let control = Control { progress: &|fraction| stage.advance(fraction), stop: &|| false };
+    let late = || limits.max_seconds.is_some_and(|seconds| start.elapsed().as_secs_f64() >= seconds);
+    let control = Control { progress: &|fraction| stage.advance(fraction), stop: &late };
     let mesher::Bake { mut baked, solution, statistics } = mesher::bake(scene, solution, &options, control);
     let mesh_seconds = stage.end();
     let report = BakeReport {
@@ -60,7 +74,7 @@ pub fn bake(scene: &Scene, flags: &LightFlags) -> (Baked, BakeReport) {
         peak_memory_bytes: None,
     };
     baked.provenance = provenance(&solution, &options, &report, statistics.min_weight);
-    (baked, report)
+    Bake { baked, solution, report }
 }
 
 /// What made a bake: the options as they were used, and the counts. No seconds: the same input gives the same bytes.
@@ -71,12 +85,12 @@ fn provenance(solution: &Solution, options: &BakeOptions, report: &BakeReport, m
     Provenance {
         program: PROGRAM.to_owned(),
         options: vec![
-            option("tolerance", options.tolerance.to_string()),
+            option(TOLERANCE, options.tolerance.to_string()),
             option(BOUNCES, bounces),
             option(LINK_ERROR, solution.link_error.to_string()),
-            option("discontinuities", options.discontinuities.to_string()),
-            option("weight", options.weight.name().to_owned()),
-            option("min-weight", min_weight.to_string()),
+            option(DISCONTINUITIES, options.discontinuities.to_string()),
+            option(WEIGHT, options.weight.name().to_owned()),
+            option(MIN_WEIGHT, min_weight.to_string()),
         ],
         statistics: vec![
             count("elements", report.elements),
@@ -90,15 +104,25 @@ fn provenance(solution: &Solution, options: &BakeOptions, report: &BakeReport, m
 }
 
 const BOUNCES: &str = "bounces";
+const DISCONTINUITIES: &str = "discontinuities";
 const LINK_ERROR: &str = "link-error";
+const MIN_WEIGHT: &str = "min-weight";
+const TOLERANCE: &str = "tolerance";
+const WEIGHT: &str = "weight";
 
-/// The options that a bake's solution was made with, so that it can be made again.
-pub fn solve_flags(provenance: &Provenance) -> LightFlags {
-    let value = |name: &str| provenance.options.iter().find(|(option, _)| option == name).map(|(_, value)| value);
+/// The options that a bake was made with, so that it can be made again.
+pub fn light_flags(provenance: &Provenance) -> LightFlags {
+    let value =
+        |name: &str| provenance.options.iter().find(|(option, _)| option == name).map(|(_, value)| value.as_str());
+    let number = |name: &str| value(name).and_then(|value| value.parse().ok());
+    let defaults = LightFlags::default();
     LightFlags {
+        tolerance: number(TOLERANCE).unwrap_or(defaults.tolerance),
         bounces: value(BOUNCES).and_then(|value| value.parse().ok()),
-        link_error: value(LINK_ERROR).and_then(|value| value.parse().ok()),
-        ..LightFlags::default()
+        discontinuities: value(DISCONTINUITIES).and_then(|value| value.parse().ok()),
+        weight: if value(WEIGHT) == Some(Weight::Ratio.name()) { WeightChoice::Ratio } else { WeightChoice::Change },
+        min_weight: number(MIN_WEIGHT),
+        link_error: number(LINK_ERROR),
     }
 }
 
@@ -189,9 +213,9 @@ mod tests {
             options: vec![(BOUNCES.into(), bounces.into()), (LINK_ERROR.into(), error.into())],
             ..Provenance::default()
         };
-        let flags = solve_flags(&options("all", "0.30000000000000004"));
+        let flags = light_flags(&options("all", "0.30000000000000004"));
         assert_eq!((flags.bounces, flags.link_error), (None, Some(0.300_000_000_000_000_04)));
-        assert_eq!(solve_flags(&options("0", "x")).bounces, Some(0));
-        assert_eq!(solve_flags(&Provenance::default()).link_error, None);
+        assert_eq!(light_flags(&options("0", "x")).bounces, Some(0));
+        assert_eq!(light_flags(&Provenance::default()).link_error, None);
     }
 }

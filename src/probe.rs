@@ -10,7 +10,7 @@ use renderer::{Estimate, SurfacePoint};
 use scene::{Baked, Bvh, Provenance, Rgb, Scene, centroid};
 use solver::Gather;
 
-use crate::args::{LightFlags, Method, ProbeFlags};
+use crate::args::{LightFlags, LimitFlags, Method, ProbeFlags};
 use crate::failure::{Outcome, Usage};
 use crate::input::{Input, require_light};
 use crate::output::Outputs;
@@ -58,7 +58,7 @@ pub fn run(flags: &ProbeFlags, outputs: &Outputs) -> Result<Outcome> {
         }
         (Method::Gather, Input::Baked(baked)) => gather(&baked.scene, &as_baked(&baked.provenance, &asked), &points),
         (Method::Interpolant, Input::Baked(baked)) => {
-            let made = pipeline::solve_flags(&baked.provenance).bounces;
+            let made = pipeline::light_flags(&baked.provenance).bounces;
             if flags.bounces.is_some() && flags.bounces != made {
                 bail!(Usage(format!(
                     "--bounces: {} holds the light of {} bounces; give the scene, or --method gather",
@@ -91,9 +91,9 @@ pub fn run(flags: &ProbeFlags, outputs: &Outputs) -> Result<Outcome> {
     Ok(Outcome::Done)
 }
 
-/// The options that solve a bake's scene again as it was solved, with the bounces asked for instead of its own.
+/// The options that bake a bake's scene again as it was baked, with the bounces asked for instead of its own.
 fn as_baked(provenance: &Provenance, asked: &LightFlags) -> LightFlags {
-    let made = pipeline::solve_flags(provenance);
+    let made = pipeline::light_flags(provenance);
     LightFlags { bounces: asked.bounces.or(made.bounces), ..made }
 }
 
@@ -107,7 +107,8 @@ fn interpolate(baked: &Baked, points: &[SurfaceQuery]) -> Vec<Option<Rgb>> {
 }
 
 fn gather(scene: &Scene, flags: &LightFlags, points: &[SurfaceQuery]) -> Vec<Option<Rgb>> {
-    let (solution, _) = pipeline::solve(scene, flags);
+    // A gather from the bake: its reflectors send what the bake says that they do.
+    let solution = pipeline::bake(scene, flags, &LimitFlags::default()).solution;
     let gather = Gather::new(scene, &solution);
     let (bvh, reach) = (Bvh::of_scene(scene), REACH * scene.size());
     let (stage, done) = (Stage::start("gather"), AtomicUsize::new(0));

@@ -9,7 +9,7 @@ use renderer::{SurfacePoint, spread_by_area};
 use scene::{Baked, Camera, Provenance, Rgb};
 use serde::Serialize;
 
-use crate::args::VerifyFlags;
+use crate::args::{LightFlags, VerifyFlags};
 use crate::error_picture::error_picture;
 use crate::failure::{Outcome, Usage};
 use crate::ground_truth::{Truth, TruthOptions, ground_truth};
@@ -38,7 +38,9 @@ pub fn run(flags: &VerifyFlags, outputs: &Outputs) -> Result<Outcome> {
     let picture = flags.picture.as_deref().map(|path| outputs.claim(path)).transpose()?;
     let table = flags.output.as_deref().map(|path| outputs.claim(path)).transpose()?;
     let input = Input::read(&flags.input)?;
-    let baked = input.into_baked(&flags.input, &Default::default(), outputs)?;
+    let defaults = LightFlags::default();
+    let asked = LightFlags { tolerance: flags.tolerance.unwrap_or(defaults.tolerance), ..defaults };
+    let baked = input.into_baked(&flags.input, &asked, outputs)?;
     require_light(&flags.input, &baked.scene)?;
     let tolerance = tolerance(flags.tolerance, &baked.provenance, &flags.input)?;
     let camera = picture.is_some().then(|| camera(&viewpoint, &baked.scene)).transpose()?;
@@ -47,7 +49,7 @@ pub fn run(flags: &VerifyFlags, outputs: &Outputs) -> Result<Outcome> {
     // The paths' seeds are 64 times the seed and more; the points' own is none of them.
     let points = spread_by_area(scene, flags.points, BORDER * scene.size(), flags.seed.wrapping_mul(64), |_| true);
     let found = interpolate(&baked, &points);
-    let bounces = pipeline::solve_flags(&baked.provenance).bounces;
+    let bounces = pipeline::light_flags(&baked.provenance).bounces;
     let options = TruthOptions { samples: flags.samples, bounces, tolerance, seed: flags.seed };
     let truth = ground_truth(scene, &points, &found, &options);
     ensure!(
@@ -203,7 +205,7 @@ impl Report {
             noise: found.noise,
             points: points.len(),
             samples: truth.paths / points.len().max(1) as u64,
-            bounces: pipeline::solve_flags(&baked.provenance).bounces,
+            bounces: pipeline::light_flags(&baked.provenance).bounces,
             tolerance,
             percentile_limit: found.percentile_limit,
             beyond: found.beyond,

@@ -172,6 +172,7 @@ fn wrong_flags_are_wrong_usage() {
         ("verify", "<SCENE|OUT.hlf>"),
         ("polish a.hlf", "polish"),
         ("info a.hlf --no-such-flag", "--no-such-flag"),
+        ("validate a.hlf", "a.hlf"),
     ] {
         let said = fails(2, &arguments.split(' ').collect::<Vec<_>>());
         assert!(said.contains(part), "{arguments}: {part:?} is missing in {said:?}");

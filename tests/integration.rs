@@ -7,6 +7,7 @@
 mod analytic;
 mod architecture;
 mod cli;
+mod closed_forms;
 mod continuity;
 mod determinism;
 mod fixture;
