@@ -33,6 +33,7 @@ MITSUBA_SPP = [4, 16, 64, 256]
 RADIANCE_LADDER = [
     "-ab 3 -ad 128 -as 32 -aa .2 -ar 32 -ds .2 -dj 0",
     "-ab 5 -ad 512 -as 128 -aa .15 -ar 64 -ds .1 -dj 0",
+    "-ab 7 -ad 2048 -as 512 -aa .15 -ar 64 -ds .05 -dj 0",
     "-ab 7 -ad 1024 -as 256 -aa .1 -ar 128 -ds .05 -dj 0",
 ]
 # The error that the figure asked for is given at.
@@ -163,7 +164,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--cache", type=Path, required=True, help="folder that keeps the peers' pictures and the truth")
     parser.add_argument("--halflight", type=Path, default=ROOT / "target/release/halflight", help="the program")
-    parser.add_argument("--ours", action="append", metavar="FLAGS", help="flags of a bake, such as --ours=--tolerance=0.01; once for each rung")
+    ours_help = "flags of a bake, such as --ours=--tolerance=0.01; once for each rung"
+    parser.add_argument("--ours", action="append", metavar="FLAGS", help=ours_help)
     parser.add_argument("--scenes", nargs="+", default=["office", "cornell_box"], help="names in data/scenes/")
     parser.add_argument("--turns", type=int, default=3, help="runs of Halflight of which the median counts")
     flags = parser.parse_args()
@@ -171,8 +173,8 @@ def main() -> None:
 
     program = subprocess.run([flags.halflight, "--version"], check=True, capture_output=True, text=True).stdout.strip()
     print(f"# A view at equal error: Halflight, Mitsuba, Radiance, {date.today()}\n")
-    print(f"Machine: {processor()}, {os.cpu_count()} threads. {program}; Mitsuba {version('mitsuba')} (llvm, path);")
-    print(f"{radiance.version()} (rpict).")
+    print(f"Machine: {processor()}, {os.cpu_count()} threads.")
+    print(f"Programs: {program}; Mitsuba {version('mitsuba')}, path, llvm; {radiance.version()}, rpict.")
     print("Command: `python benches/peers/peers.py --cache FOLDER`; data/record/README.md says how to install the peers.\n")
     print(PREFACE.format(truth=" and ".join(map(str, TRUTH_SPP))))
     for name in flags.scenes:
@@ -192,10 +194,10 @@ PREFACE = """\
 CPU, everything included; of Mitsuba without Python's start and import and with its kernels compiled already; of Radiance
 oconv, an overture that fills the ambient cache, and rpict. The error is the relative RMSE of radiance averaged over 4 × 4
 pixels, ((L − L_true) ÷ max(own, mean))², blocks within a pixel of a lamp left out. The truth is Mitsuba's path tracer
-along the rays through the pixels' centres, which Halflight and rpict draw, in two parts of {truth} paths a pixel with noises of
-their own: L_true in a square is one part in one factor and the other in the other, so that the truth's noise falls out. Mitsuba
-itself samples all over each pixel, so its error is its noise, from the difference of two pictures. Between the rungs of a
-ladder seconds are interpolated in both logarithms; (x) is extrapolated as noise falls, with the root of the paths."""
+along the rays through the pixels' centres, which Halflight and rpict draw, in two parts of {truth} paths a pixel:
+a difference's square has one part in one factor and the other in the other, so that the truth's noise falls out. Mitsuba itself
+samples all over each pixel, so its error is its noise, from the difference of two pictures. Between the rungs of a ladder
+seconds are interpolated in both logarithms; (x) is extrapolated as noise falls, with the root of the paths."""
 
 
 if __name__ == "__main__":

@@ -23,8 +23,11 @@ def radiance_text(scene: SceneFile) -> str:
     """
     lines = []
     for name, material in scene.materials.items():
-        kind, (r, g, b), rest = ("light", material.radiance, "") if material.emits else ("plastic", material.reflectance, " 0 0")
-        lines += [f"void {kind} {name}", "0", "0", f"{5 if rest else 3} {r} {g} {b}{rest}"]
+        if material.emits:
+            lines += [f"void light {name}", "0", "0", "3 {} {} {}".format(*material.radiance)]
+        else:
+            # No gloss, no roughness.
+            lines += [f"void plastic {name}", "0", "0", "5 {} {} {} 0 0".format(*material.reflectance)]
     for index, (material, corners) in enumerate(scene.polygons):
         lines += [f"{material} polygon p{index}", "0", "0", str(3 * len(corners))]
         lines += ["{!r} {!r} {!r}".format(*scene.vertices[corner]) for corner in corners]
