@@ -30,9 +30,13 @@ SIZE = "512x512"
 # their noises, so that one of them may be cheap.
 TRUTH_SPP = [1024, 256]
 MITSUBA_SPP = [4, 16, 64, 256]
+# More rays for each cached point (-ad) pay more than more points (-aa, -ar): the last rung shows it.
 RADIANCE_LADDER = [
     "-ab 3 -ad 128 -as 32 -aa .2 -ar 32 -ds .2 -dj 0",
     "-ab 5 -ad 512 -as 128 -aa .15 -ar 64 -ds .1 -dj 0",
+    "-ab 7 -ad 512 -as 128 -aa .2 -ar 64 -ds .05 -dj 0",
+    "-ab 7 -ad 1024 -as 256 -aa .2 -ar 64 -ds .05 -dj 0",
+    "-ab 7 -ad 2048 -as 512 -aa .2 -ar 64 -ds .05 -dj 0",
     "-ab 7 -ad 2048 -as 512 -aa .15 -ar 64 -ds .05 -dj 0",
     "-ab 7 -ad 1024 -as 256 -aa .1 -ar 128 -ds .05 -dj 0",
 ]
