@@ -11,8 +11,8 @@ mod measure;
 use std::collections::{HashMap, HashSet};
 
 use glam::DVec3;
-use measure::{SCENES, Truth, on_curve, percent, read, solved};
-use mesher::{BakeOptions, bake};
+use measure::{SCENES, Truth, on_curve, percent, read, solved, unrefined};
+use mesher::BakeOptions;
 use rayon::prelude::*;
 use scene::{Baked, Rgb, Scene};
 use solver::{Gather, Solution};
@@ -49,7 +49,7 @@ fn main() {
                 let solution = solved(&scene, bounces, coarseness);
                 let default = BakeOptions::default();
                 let min_weight = Some(minimum * default.weight.default_minimum(&scene, &solution));
-                let (baked, _) = bake(&scene, &solution, &BakeOptions { min_weight, ..default }, &|_| ());
+                let (baked, _) = unrefined(&scene, &solution, &BakeOptions { min_weight, ..default });
                 let (errors, samples) = (errors(&scene, &solution, &baked), samples(&baked));
                 let [e0, e1, e2, e3] = errors.map(percent);
                 let [s0, s1, s2, s3] = samples;

@@ -7,16 +7,13 @@
 
 mod measure;
 
-use measure::{SCENES, Truth, on_curve, percent, read, solved};
-use mesher::{BakeOptions, Weight, bake};
+use measure::{SCENES, Truth, on_curve, percent, read, solved, unrefined};
+use mesher::{BakeOptions, Weight};
 use scene::{Rgb, Scene};
 use solver::Solution;
 
 /// Multiples of the default link error: coarse leaves to fine ones.
 const COARSENESS: [f64; 3] = [8.0, 1.0, 0.125];
-
-/// The same where all light is baked: the leaves of the finest take minutes.
-const COARSENESS_OF_ALL: [f64; 2] = [8.0, 1.0];
 
 /// Multiples of the default w_min.
 const MINIMUM: [f64; 5] = [32.0, 8.0, 2.0, 1.0, 0.5];
@@ -43,49 +40,42 @@ fn main() {
     );
     for name in SCENES {
         let scene = read(name);
-        for (light, bounces, sweep) in
-            [("direct light", Some(0), &COARSENESS[..]), ("all light", None, &COARSENESS_OF_ALL[..])]
-        {
-            println!("\n## {name}, {light}\n");
-            println!("| link error | elements | weight | chosen by | lines | triangles | samples | error | mean |");
-            println!("|---|---|---|---|---|---|---|---|---|");
-            let mut by_minimum = [Vec::new(), Vec::new()];
-            let mut by_count = [Vec::new(), Vec::new()];
-            for &coarseness in sweep {
-                let solution = solved(&scene, bounces, coarseness);
-                let case = Case { scene: &scene, truth: Truth::of(&scene, &solution), solution, coarseness };
-                case.row("–", "none", Weight::Ratio, 0, 0.0);
+        // Light over reflectors has a mesh of its own, without discontinuities.
+        println!("\n## {name}, direct light\n");
+        println!("| link error | elements | weight | chosen by | lines | triangles | samples | error | mean |");
+        println!("|---|---|---|---|---|---|---|---|---|");
+        let mut by_minimum = [Vec::new(), Vec::new()];
+        let mut by_count = [Vec::new(), Vec::new()];
+        for &coarseness in &COARSENESS {
+            let solution = solved(&scene, Some(0), coarseness);
+            let case = Case { scene: &scene, truth: Truth::of(&scene, &solution), solution, coarseness };
+            case.row("–", "none", Weight::Ratio, 0, 0.0);
+            for (i, weight) in WEIGHTS.into_iter().enumerate() {
+                for factor in MINIMUM {
+                    let minimum = factor * weight.default_minimum(&scene, &case.solution);
+                    let chosen = format!("w ≥ {minimum:.3}");
+                    let point = case.row(weight.name(), &chosen, weight, UNLIMITED, minimum);
+                    by_minimum[i].push((coarseness, point));
+                }
+            }
+            // With all light every polygon is a source, and w_min = 0 finds lines without end.
+            if coarseness == 1.0 {
                 for (i, weight) in WEIGHTS.into_iter().enumerate() {
-                    for factor in MINIMUM {
-                        let minimum = factor * weight.default_minimum(&scene, &case.solution);
-                        let chosen = format!("w ≥ {minimum:.3}");
-                        let point = case.row(weight.name(), &chosen, weight, UNLIMITED, minimum);
-                        by_minimum[i].push((coarseness, point));
+                    for count in COUNTS {
+                        let point = case.row(weight.name(), &format!("k = {count}"), weight, count, 0.0);
+                        by_count[i].push((coarseness, point));
                     }
                 }
-                // With all light every polygon is a source, and w_min = 0 finds lines without end.
-                if coarseness == 1.0 && bounces == Some(0) {
-                    for (i, weight) in WEIGHTS.into_iter().enumerate() {
-                        for count in COUNTS {
-                            let point = case.row(weight.name(), &format!("k = {count}"), weight, count, 0.0);
-                            by_count[i].push((coarseness, point));
-                        }
-                    }
-                    case.row("–", "all", Weight::Ratio, UNLIMITED, 0.0);
-                }
-            }
-            println!(
-                "\nThe error of `change` over that of `ratio` at equal triangles, between the ends of both curves:\n"
-            );
-            println!("| link error | curve | at the fewest | in the middle | at the most |");
-            println!("|---|---|---|---|---|");
-            for &coarseness in sweep {
-                compare("w_min", coarseness, &by_minimum);
-            }
-            if bounces == Some(0) {
-                compare("k", 1.0, &by_count);
+                case.row("–", "all", Weight::Ratio, UNLIMITED, 0.0);
             }
         }
+        println!("\nThe error of `change` over that of `ratio` at equal triangles, between the ends of both curves:\n");
+        println!("| link error | curve | at the fewest | in the middle | at the most |");
+        println!("|---|---|---|---|---|");
+        for &coarseness in &COARSENESS {
+            compare("w_min", coarseness, &by_minimum);
+        }
+        compare("k", 1.0, &by_count);
     }
 }
 
@@ -103,8 +93,8 @@ type Point = (f64, f64);
 impl Case<'_> {
     /// Bakes and prints a row of the table.
     fn row(&self, name: &str, chosen: &str, weight: Weight, discontinuities: u32, min_weight: f64) -> Point {
-        let options = BakeOptions { discontinuities, weight, min_weight: Some(min_weight) };
-        let (baked, statistics) = bake(self.scene, &self.solution, &options, &|_| ());
+        let options = BakeOptions { discontinuities, weight, min_weight: Some(min_weight), ..BakeOptions::default() };
+        let (baked, statistics) = unrefined(self.scene, &self.solution, &options);
         let places = self.truth.places(&baked);
         let values = places.into_iter().map(|(triangle, s, t)| baked.irradiance(triangle, s, t));
         let values: Vec<Rgb> = values.collect();

@@ -4,8 +4,8 @@
 
 #![allow(clippy::print_stdout, clippy::unwrap_used)]
 
-use std::path::{Path, PathBuf};
-use std::process::Command;
+mod common;
+
 use std::time::Instant;
 
 use scene::Baked;
@@ -21,7 +21,7 @@ const OF_THE_PAPER: [&str; 8] =
 
 fn main() {
     println!("# The paper's figures and ours\n");
-    println!("Machine: {}, {} threads.", processor(), std::thread::available_parallelism().unwrap());
+    println!("{}", common::machine());
     println!("Command: `cargo bench --bench paper`, {}.\n", env!("CARGO_PKG_VERSION"));
     let (paper, baked) = bake(&OF_THE_PAPER);
     let (default, _) = bake(&[]);
@@ -71,30 +71,17 @@ fn main() {
 
 /// Bakes the office with the program itself: its report and the bake.
 fn bake(options: &[&str]) -> (Value, Baked) {
-    let output: PathBuf = Path::new(env!("CARGO_TARGET_TMPDIR")).join("paper.hlf");
-    let mut command = Command::new(env!("CARGO_BIN_EXE_halflight"));
-    command.args(["bake", "data/scenes/office.obj", "--json", "-o"]).arg(&output).args(options);
-    let found = command.current_dir(env!("CARGO_MANIFEST_DIR")).output().unwrap();
-    assert!(found.status.success(), "{}", String::from_utf8_lossy(&found.stderr));
-    (serde_json::from_slice(&found.stdout).unwrap(), formats::read_baked(&output).unwrap())
+    let output = common::scratch("paper.hlf");
+    let report = common::bake("office", options, &output);
+    (report, formats::read_baked(&output).unwrap())
 }
 
 /// Milliseconds.
 fn median_of(mut work: impl FnMut()) -> f64 {
-    let mut times: Vec<f64> = (0..FRAMES)
-        .map(|_| {
-            let start = Instant::now();
-            work();
-            start.elapsed().as_secs_f64() * 1000.0
-        })
-        .collect();
-    times.sort_by(f64::total_cmp);
-    times[FRAMES / 2]
-}
-
-/// The processor's name, where the system tells.
-fn processor() -> String {
-    let text = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
-    let name = text.lines().find_map(|line| line.strip_prefix("model name")?.split_once(": "));
-    name.map_or_else(|| "unknown processor".to_owned(), |(_, name)| name.to_owned())
+    let times = (0..FRAMES).map(|_| {
+        let start = Instant::now();
+        work();
+        start.elapsed().as_secs_f64() * 1000.0
+    });
+    common::median(times.collect())
 }

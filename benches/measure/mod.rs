@@ -4,6 +4,7 @@
 
 use std::path::Path;
 
+use mesher::{BakeOptions, BakeStatistics, Control};
 use rayon::prelude::*;
 use renderer::{SurfacePoint, spread_by_area};
 use scene::{Baked, Rgb, Scene, centroid};
@@ -28,6 +29,14 @@ pub fn solved(scene: &Scene, bounces: Option<u32>, coarseness: f64) -> Solution 
     let default = SolveOptions { link_error: None, bounces };
     let link_error = solve(scene, &default, &|_| ()).link_error * coarseness;
     solve(scene, &SolveOptions { link_error: Some(link_error), bounces }, &|_| ())
+}
+
+/// A bake on the leaves and lines that it is given: asked for so little that nothing is refined.
+pub fn unrefined(scene: &Scene, solution: &Solution, options: &BakeOptions) -> (Baked, BakeStatistics) {
+    let options = BakeOptions { tolerance: 1e6, ..options.clone() };
+    let control = Control { progress: &|_| (), stop: &|| false };
+    let bake = mesher::bake(scene, solution.clone(), &options, control);
+    (bake.baked, bake.statistics)
 }
 
 /// Points and the exact gather of a solution at them, W·m⁻².

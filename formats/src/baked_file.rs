@@ -25,7 +25,7 @@ use crate::{FormatError, write_atomically};
 const MAGIC: [u8; 8] = *b"\x89HLF\r\n\x1a\n";
 
 /// Raised with every change that an older program would misread.
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 
 /// Bytes before the header.
 const PREAMBLE: usize = 20;
@@ -268,7 +268,7 @@ mod tests {
                     ends: [Vec3::X, Vec3::Y],
                 })
                 .to_vec(),
-            error: BakedError { rms: 0.003, p99: 0.02, max: 0.1, points: 12 },
+            error: BakedError { rms: 0.003, p99: 0.02, max: 0.1, points: 12, holds: true },
             provenance: Provenance {
                 program: "halflight 0.1.0".into(),
                 options: vec![("tolerance".into(), "0.01".into())],

@@ -112,6 +112,9 @@ pub(crate) fn residual(
 fn misfits(scene: &Scene, solution: &Solution, fine: &FineMesh, reflecting: &[Rgb]) -> Vec<f64> {
     let elements = &solution.elements;
     let mut sums = vec![0.0; elements.nodes.len()];
+    if !solution.reflects() {
+        return sums;
+    }
     for (triangle, samples) in fine.table.triangles.iter().enumerate() {
         let leaf = &fine.leaves[fine.mesh.triangles[triangle].leaf as usize];
         let patch = &elements.patches[elements.patch_of(leaf.element).unwrap_or_default() as usize];
