@@ -3,6 +3,7 @@
 use std::f64::consts::PI;
 
 use glam::DVec3;
+use serde_json::Value;
 
 use crate::fixture::{box_faces, data, folder, probe, run, text, write_points, write_scene};
 use crate::reference::Table;
@@ -80,4 +81,33 @@ fn no_light_leaks_under_a_wall() {
     let outside = [DVec3::new(1.29, 1.8, 0.0), DVec3::new(2.21, 1.8, 0.0), DVec3::new(1.7, 1.09, 0.0)];
     let points = write_points(folder.path(), outside.into_iter().map(|point| (point, DVec3::Z)));
     assert!(probe(&scene, &points, &[]).into_iter().all(|found| found.min_element() > 0.1));
+}
+
+/// A closed room that reflects 90 % and is lit by its ceiling's middle absorbs what is emitted: mean E = Φ/(S(1−ρ)), CIE
+/// 171:2006, 5.8. A link carries the mean of its source, and where some receivers link to the parts of a source and others
+/// to the whole, links lose light; a bake must not.
+#[test]
+fn light_is_kept_where_links_start_from_parts_and_from_the_whole() {
+    let folder = folder();
+    let (side, flux, reflectance) = (4.0, 10_000.0, 0.9);
+    let walls = box_faces(DVec3::ZERO, DVec3::splat(side), true, &[0, 2, 3, 4, 5]);
+    let mut quads: Vec<_> = walls.into_iter().map(|corners| (corners, "wall")).collect();
+    let down = |x: [f64; 2], y: [f64; 2]| {
+        [(x[0], y[0]), (x[0], y[1]), (x[1], y[1]), (x[1], y[0])].map(|(x, y)| DVec3::new(x, y, side))
+    };
+    quads.push((down([0.0, side], [0.0, 1.5]), "wall"));
+    quads.push((down([0.0, side], [2.5, side]), "wall"));
+    quads.push((down([0.0, 1.5], [1.5, 2.5]), "wall"));
+    quads.push((down([2.5, side], [1.5, 2.5]), "wall"));
+    quads.push((down([1.5, 2.5], [1.5, 2.5]), "lamp"));
+    let radiance = flux / PI;
+    let grey = format!("Kd {reflectance} {reflectance} {reflectance}");
+    let materials = format!("newmtl wall\n{grey}\nnewmtl lamp\n{grey}\nKe {radiance} {radiance} {radiance}\n");
+    let scene = write_scene(folder.path(), &materials, &quads);
+    let bake = folder.path().join("cube.hlf");
+    run(&["bake", text(&scene), "-o", text(&bake), "--link-error", "50"]);
+    let info: Value = serde_json::from_slice(&run(&["info", text(&bake), "--json"]).stdout).unwrap();
+    let mean = info["bake"]["mean_irradiance"][0].as_f64().unwrap();
+    let lost = 1.0 - mean / (flux / (6.0 * side * side * (1.0 - reflectance)));
+    assert!(lost.abs() <= 0.01, "{:.1} % of the light is lost", 100.0 * lost);
 }

@@ -36,7 +36,7 @@ pub struct BakeOptions {
 /// The share of the tolerance that the interpolation of emitters' light, and as much again that of reflectors' light, may use
 /// up in the first round, as probes see it. Probes miss what lies between them, and the sum of bounces what each is off by:
 /// with more a first round seldom does, with less it takes leaves that nobody asked for.
-const FIRST_SHARE: f64 = 0.34;
+const FIRST_SHARE: f64 = 0.36;
 
 /// What the error is aimed at where a round has missed the tolerance, as a part of the tolerance; and by how much a share
 /// shrinks for it at most and at least. Less divides too much, more asks for one round more.
@@ -50,7 +50,7 @@ const AIM: f64 = 0.6;
 const MESHES: u32 = 12;
 
 /// What a round must bring the error down to, as a part of the last one's, for another to be worth its time.
-const WORTHWHILE: f64 = 0.95;
+const WORTHWHILE: f64 = 1.0;
 
 /// Rounds at most: by then a share is a twentieth of the tolerance, and the fault lies elsewhere.
 const ROUNDS: u32 = 5;
@@ -63,10 +63,18 @@ const SMALLEST_LEAF: f64 = 1e-3;
 /// what lies between their probes, shorter ones cost more than a room needs.
 const FRONT_LENGTH: f64 = 0.1;
 
-/// The part of [`BakeOptions::tolerance`] that a row may misplace on account of each reflector.
-const SOURCE_SHARE: f64 = 0.1;
+/// The part of [`BakeOptions::tolerance`] that a row may misplace on account of each reflector, in the first round. What is
+/// misplaced has one sign, since a point sees most of what is near and light is mostly brightest in the middle: many
+/// reflectors, and many bounces, add up. More is faster where they are few.
+const FIRST_SOURCE_SHARE: f64 = 0.12;
 
-/// The part of the tolerance, relative to the scene's mean irradiance, by which the last exchange may still change a sample.
+/// What that part shrinks by from round to round where the bake as a whole is too dark or too bright by more than `BIAS` of
+/// the tolerance.
+const NEXT_SOURCE_SHARE: f64 = 0.3;
+const BIAS: f64 = 0.5;
+
+/// The part of the tolerance, relative to the scene's mean irradiance, that all further exchanges may still change a sample by:
+/// the last one's change, summed over the bounces to come.
 const RESIDUAL_SHARE: f64 = 0.02;
 
 impl Default for BakeOptions {
@@ -131,6 +139,7 @@ pub fn bake(scene: &Scene, solution: Solution, options: &BakeOptions, control: C
     let min_weight = options.min_weight.unwrap_or_else(|| relative * options.weight.default_minimum(scene, &solution));
     (control.progress)(0.0);
     let found = all_discontinuities(scene, &solution, options.weight, min_weight);
+    let reflectance = mean_reflectance(scene, &solution);
     let mut rounds = Rounds {
         scene,
         options,
@@ -139,8 +148,9 @@ pub fn bake(scene: &Scene, solution: Solution, options: &BakeOptions, control: C
         solution,
         found,
         share: FIRST_SHARE,
+        source_share: FIRST_SOURCE_SHARE,
+        reflectance,
     };
-    let reflectance = mean_reflectance(scene, &rounds.solution);
     let mut statistics = BakeStatistics { min_weight, ..BakeStatistics::default() };
     let mut best: Option<(FineMesh, Vec<Rgb>, BakedError)> = None;
     let (fine, samples, error) = loop {
@@ -148,7 +158,7 @@ pub fn bake(scene: &Scene, solution: Solution, options: &BakeOptions, control: C
         let samples = rounds.samples(&fine);
         let reflecting = &rounds.reflected.reflecting;
         let points = residual(scene, &rounds.solution, &fine, &samples, reflecting, options.tolerance);
-        let error = measured(&points, options.tolerance, reflectance);
+        let (error, bias) = measured(&points, options.tolerance, rounds.reflectance);
         statistics.rounds += 1;
         let too_many = fine.triangles() > options.max_triangles;
         if too_many && let Some(best) = best {
@@ -160,7 +170,11 @@ pub fn bake(scene: &Scene, solution: Solution, options: &BakeOptions, control: C
         if error.holds || too_many || stalls || statistics.rounds == ROUNDS || (control.stop)() {
             break (fine, samples, error);
         }
-        rounds.share *= (NEXT_AIM / missed(&error)).clamp(NEXT_SHARE[0], NEXT_SHARE[1]);
+        if bias > BIAS * options.tolerance {
+            rounds.source_share *= NEXT_SOURCE_SHARE;
+        } else {
+            rounds.share *= (NEXT_AIM / missed(&error)).clamp(NEXT_SHARE[0], NEXT_SHARE[1]);
+        }
         (control.progress)(1.0 - 0.5f64.powi(statistics.rounds as i32));
         best = Some((fine, samples, error));
     };
@@ -206,6 +220,10 @@ struct Rounds<'a> {
     mean: f64,
     /// The share of the tolerance that each of the two kinds of light may use up in this round.
     share: f64,
+    /// The part of the tolerance that a row may misplace on account of each reflector.
+    source_share: f64,
+    /// The part of the light on all surfaces that they reflect, 0..=1.
+    reflectance: f64,
 }
 
 impl Rounds<'_> {
@@ -217,8 +235,8 @@ impl Rounds<'_> {
         }
         for _ in 0..MESHES {
             let exchange = Exchange {
-                source_error: SOURCE_SHARE * self.options.tolerance,
-                residual: RESIDUAL_SHARE * self.options.tolerance * self.mean,
+                source_error: self.source_share * self.options.tolerance,
+                residual: RESIDUAL_SHARE * self.options.tolerance * self.mean * (1.0 - self.reflectance),
             };
             self.reflected.solve(self.scene, &mut self.solution, &fine, &exchange);
             let errors = self.reflected.leaf_errors(self.scene, &self.solution, &exchange);
@@ -233,7 +251,7 @@ impl Rounds<'_> {
             if divided.is_empty() || fine.triangles() > self.options.max_triangles {
                 break;
             }
-            if self.reflected.refine(&mut self.solution, &divided) {
+            if self.reflected.divide(&mut self.solution, &divided) {
                 fine = self.fine_mesh();
             }
         }
@@ -307,11 +325,12 @@ const P99: f64 = 5.0;
 const CONFIDENCE: f64 = 2.326;
 
 /// The error of a bake by its residual at points spread evenly by area, each relative to max(own, mean) irradiance.
-/// `reflectance` is the part of all light that is reflected.
-fn measured(points: &[ResidualPoint], tolerance: f64, reflectance: f64) -> BakedError {
+/// `reflectance` is the part of all light that is reflected. And the part of it that the bake as a whole is off by, after all
+/// bounces.
+fn measured(points: &[ResidualPoint], tolerance: f64, reflectance: f64) -> (BakedError, f64) {
     let count = points.len() as f64;
     if points.is_empty() {
-        return BakedError { holds: true, ..BakedError::default() };
+        return (BakedError { holds: true, ..BakedError::default() }, 0.0);
     }
     let mean = points.iter().map(|point| point.irradiance).sum::<f64>() / count;
     let scale = |point: &ResidualPoint| point.irradiance.max(mean).max(f64::MIN_POSITIVE);
@@ -320,10 +339,15 @@ fn measured(points: &[ResidualPoint], tolerance: f64, reflectance: f64) -> Baked
         colour_mean(a * b) / scale(point).powi(2)
     };
     let mean_square = points.iter().map(product).sum::<f64>() / count;
-    // What the residual is off by on average is reflected again and again: the bake is off by the sum of it.
-    let bias = points.iter().map(|point| colour_mean(point.differences[0] + point.differences[1]) / 2.0 / scale(point));
-    let bias = bias.sum::<f64>() / count;
-    let amplified = (bias / (1.0 - reflectance.min(LARGEST_REFLECTANCE))).powi(2) - bias * bias;
+    // What the residual is off by on average, or may be for all that was measured, is reflected again and again: the bake is
+    // off by the sum of it.
+    let excess = |point: &ResidualPoint| colour_mean(point.differences[0] + point.differences[1]) / 2.0;
+    let mean_excess = points.iter().map(excess).sum::<f64>() / count;
+    let spread = points.iter().map(|point| (excess(point) - mean_excess).powi(2)).sum::<f64>() / count;
+    let limit = mean_excess.abs() + CONFIDENCE * (spread / count).sqrt();
+    let bias = if mean > 0.0 { limit / mean } else { 0.0 };
+    let sum_of_bounces = bias / (1.0 - reflectance);
+    let amplified = sum_of_bounces.powi(2) - bias * bias;
     let scatter = points.iter().map(|point| (product(point) - mean_square).powi(2)).sum::<f64>() / count;
     let limit = mean_square + CONFIDENCE * (scatter / count).sqrt();
     let errors: Vec<f64> = points
@@ -335,13 +359,14 @@ fn measured(points: &[ResidualPoint], tolerance: f64, reflectance: f64) -> Baked
         .collect();
     let p99 = percentile(&errors, &vec![1.0; errors.len()], 0.99);
     let rms = (limit.max(0.0) + amplified).sqrt();
-    BakedError {
+    let error = BakedError {
         rms,
         p99,
         max: errors.iter().copied().fold(0.0, f64::max),
         points: points.len() as u64,
         holds: rms <= tolerance && p99 <= P99 * tolerance,
-    }
+    };
+    (error, sum_of_bounces)
 }
 
 /// Reflectance that a mean is taken for at most: beyond it nothing can be said by a sum.
@@ -359,7 +384,7 @@ fn mean_reflectance(scene: &Scene, solution: &Solution) -> f64 {
         arrives += colour_mean(irradiance);
         leaves += colour_mean(irradiance * scene.material(polygon).reflectance);
     }
-    if arrives > 0.0 { leaves / arrives } else { 0.0 }
+    if arrives > 0.0 { (leaves / arrives).min(LARGEST_REFLECTANCE) } else { 0.0 }
 }
 
 /// The discontinuities on every polygon.

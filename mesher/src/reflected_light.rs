@@ -25,8 +25,6 @@ use crate::{Leaf, Mesh, SampleQuery, SampleTable, edge_table, leaf_meshes, sampl
 pub(crate) struct ReflectedLight {
     /// The leaves of the coarse mesh, elements of the solution.
     front: Vec<NodeId>,
-    /// Leaves over which light is quadratic, ascending; over the others it is linear, for a third of the samples.
-    quadratic: Vec<NodeId>,
     /// What a sample sees, by what it is asked: kept from mesh to mesh.
     rows: HashMap<Station, Row>,
     coarse: CoarseMesh,
@@ -56,10 +54,6 @@ struct CoarseMesh {
     table: SampleTable,
     /// First triangle of each leaf, and their number at the end.
     first: Vec<usize>,
-    /// Samples that are looked at, ascending; the others are midpoints between two of them.
-    looking: Vec<u32>,
-    /// By sample that is not looked at, the two vertices' samples that it is the mean of.
-    between: Vec<(u32, [u32; 2])>,
     /// Irradiance over reflectors at each sample, W·m⁻².
     values: Vec<Rgb>,
 }
@@ -89,44 +83,38 @@ impl ReflectedLight {
                 open.extend(elements.children(node).rev());
             }
         }
-        Self {
-            front,
-            quadratic: Vec::new(),
-            rows: HashMap::new(),
-            coarse: CoarseMesh::default(),
-            reflecting: Vec::new(),
-        }
+        Self { front, rows: HashMap::new(), coarse: CoarseMesh::default(), reflecting: Vec::new() }
     }
 
     /// Finds the light: meshes the front, finds what new samples see, and sends light to and fro.
     pub fn solve(&mut self, scene: &Scene, solution: &mut Solution, fine: &FineMesh, options: &Exchange) {
         let projection = Projection::new(fine, solution);
-        if self.coarse.leaves.is_empty() {
+        let is_first = self.coarse.leaves.is_empty();
+        if is_first {
             self.solve_roughly(scene, solution, fine, &projection, options);
         }
-        self.coarse = CoarseMesh::new(scene, solution, &self.front, &self.quadratic);
+        self.coarse = CoarseMesh::new(scene, solution, &self.front);
         let queries: Vec<[SampleQuery; 2]> =
-            self.coarse.looking.iter().map(|&i| stand_ins(solution, &self.coarse.table.queries[i as usize])).collect();
+            self.coarse.table.queries.iter().map(|query| stand_ins(solution, query)).collect();
         self.look(scene, solution, queries.as_flattened(), options, STALE);
         let places = self.places(solution, fine);
         let rows: Vec<[&Row; 2]> =
             queries.iter().map(|pair| pair.each_ref().map(|query| &self.rows[&station(query)])).collect();
         let receive = |solution: &Solution| received_between(&Radiosity::of(scene, solution), &rows);
-        // Without a limit to the bounces the light that is known is as good a start as any.
-        let mut values = match solution.bounces {
-            Some(_) => vec![Rgb::ZERO; queries.len()],
-            None => receive(solution),
-        };
+        // From darkness, so that what is dark stays exactly dark; later on from the light that is known, where all bounces count.
+        let mut values =
+            if is_first || solution.bounces.is_some() { vec![Rgb::ZERO; queries.len()] } else { receive(solution) };
         for _ in 0..solution.bounces.unwrap_or(MOST_ITERATIONS) {
-            self.coarse.set_values(&values);
+            self.coarse.values = values;
             self.reflecting = total(&self.coarse, fine, &places);
             solution.set_light(projection.planes(&self.reflecting));
-            let before = std::mem::replace(&mut values, receive(solution));
-            if solution.bounces.is_none() && largest_move(&before, &values) <= options.residual {
+            values = receive(solution);
+            let moved = largest_move(&self.coarse.values, &values);
+            if solution.bounces.is_none() && moved <= options.residual {
                 break;
             }
         }
-        self.coarse.set_values(&values);
+        self.coarse.values = values;
     }
 
     /// Light as it is at one point of every leaf, on top of the links' slopes. What reflectors send decides what is opened:
@@ -194,19 +182,14 @@ impl ReflectedLight {
         self.rows.len()
     }
 
-    /// Refines leaves of the front, given ascending: light that was linear becomes quadratic, and where it was that already
-    /// the leaf is divided. Returns whether the solution's elements were divided, too, for want of parts.
-    pub fn refine(&mut self, solution: &mut Solution, leaves: &[NodeId]) -> bool {
-        let (divided, linear): (Vec<NodeId>, Vec<NodeId>) =
-            leaves.iter().partition(|leaf| self.quadratic.binary_search(leaf).is_ok());
-        let whole: Vec<NodeId> = divided.iter().copied().filter(|&leaf| solution.elements.is_leaf(leaf)).collect();
+    /// Divides leaves of the front, given ascending. Returns whether the solution's elements were divided, too, for want of
+    /// parts.
+    pub fn divide(&mut self, solution: &mut Solution, leaves: &[NodeId]) -> bool {
+        let whole: Vec<NodeId> = leaves.iter().copied().filter(|&leaf| solution.elements.is_leaf(leaf)).collect();
         whole.iter().for_each(|&leaf| solution.subdivide(leaf));
-        let is_divided = |node: NodeId| divided.binary_search(&node).is_ok();
+        let is_divided = |node: NodeId| leaves.binary_search(&node).is_ok();
         let parts = |node: NodeId| if is_divided(node) { solution.elements.children(node) } else { node..node + 1 };
         self.front = self.front.iter().flat_map(|&node| parts(node)).collect();
-        self.quadratic.extend(linear);
-        self.quadratic.extend(divided.iter().flat_map(|&node| solution.elements.children(node)));
-        self.quadratic.sort_unstable();
         !whole.is_empty()
     }
 
@@ -374,7 +357,7 @@ fn offset(solution: &Solution, element: NodeId, position: DVec3) -> DVec2 {
 }
 
 impl CoarseMesh {
-    fn new(scene: &Scene, solution: &Solution, front: &[NodeId], quadratic: &[NodeId]) -> Self {
+    fn new(scene: &Scene, solution: &Solution, front: &[NodeId]) -> Self {
         let elements = &solution.elements;
         let leaf = |&element: &NodeId| Leaf {
             element,
@@ -393,30 +376,8 @@ impl CoarseMesh {
         for i in 1..first.len() {
             first[i] += first[i - 1];
         }
-        // A midpoint is looked at if any leaf that has it is quadratic: so neighbours agree on their border.
-        let mut ends: Vec<Option<[u32; 2]>> = vec![None; table.queries.len()];
-        let mut looks = vec![false; table.queries.len()];
-        for (triangle, samples) in mesh.triangles.iter().zip(&table.triangles) {
-            let is_quadratic = quadratic.binary_search(&leaves[triangle.leaf as usize].element).is_ok();
-            for i in 0..6 {
-                looks[samples[i] as usize] |= is_quadratic || i % 2 == 0;
-                ends[samples[i] as usize] = Some([samples[(i + 5) % 6], samples[(i + 1) % 6]]);
-            }
-        }
-        let (looking, others): (Vec<u32>, Vec<u32>) = (0..looks.len() as u32).partition(|&i| looks[i as usize]);
-        let between = others.into_iter().filter_map(|i| Some((i, ends[i as usize]?))).collect();
         let values = vec![Rgb::ZERO; table.queries.len()];
-        Self { leaves, mesh, table, first, looking, between, values }
-    }
-
-    /// Sets the values of all samples by those that are looked at.
-    fn set_values(&mut self, values: &[Rgb]) {
-        for (&sample, &value) in self.looking.iter().zip(values) {
-            self.values[sample as usize] = value;
-        }
-        for &(sample, [a, b]) in &self.between {
-            self.values[sample as usize] = (self.values[a as usize] + self.values[b as usize]) / 2.0;
-        }
+        Self { leaves, mesh, table, first, values }
     }
 
     fn corners(&self, triangle: usize) -> [DVec3; 3] {

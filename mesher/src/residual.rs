@@ -1,20 +1,20 @@
 //! The residual of a bake: what one more bounce, found by other means, would change.
 //!
-//! At points spread evenly by area light is found once more: from emitters exactly, over reflectors by the planes of the
-//! nodes that a point sees, corrected by rays. A ray reads at its end by how much the bake differs from the plane that was
-//! taken for it. So rays have no bias, and little to scatter about (a control variate): what the bake differs by is the error of
-//! its interpolants, of the planes and of what was not opened, all together. There are two independent halves of the rays, and
+//! At points spread evenly by area light is found once more: from emitters exactly, over reflectors by the means of the nodes
+//! that a point sees, whose form factors are exact, corrected by rays. A ray reads at its end by how much the bake differs from
+//! the mean that was taken for it. So the answer has no bias, and rays have little to scatter about (a control variate): it
+//! sees the error of interpolants, of planes over nodes and of what was not opened, all together. There are two independent halves of the rays, and
 //! the mean square is that of the products of the two differences, in which what scatter there is cancels.
 
-use std::collections::HashMap;
+use std::collections::HashSet;
 use std::f64::consts::TAU;
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use rayon::prelude::*;
-use scene::{Bvh, Interpolant, Ray, Rgb, SAMPLE_BARYCENTRICS, Scene};
-use solver::{ElementLight, Gather, NodeId, SeenNode, Solution};
+use scene::{Bvh, Interpolant, Ray, Rgb, Scene, other_sides};
+use solver::{Gather, NodeId, SeenNode, Solution};
 
 use crate::fine_mesh::FineMesh;
 use crate::probe::{at, colour_mean};
@@ -26,9 +26,10 @@ const POINTS: usize = 1024;
 const SCATTER: f64 = 1.0;
 const RAYS: [f64; 2] = [4.0, 4096.0];
 
-/// The part of the tolerance that one reflector may misplace at a point before its elements are opened: rays correct it, so
-/// more only makes them scatter.
-const SOURCE_SHARE: f64 = 0.3;
+/// How far the light of a reflector may stray from a plane over the nodes that points see, as a fraction of the scene's mean
+/// irradiance. More leaves more to rays, less more to form factors. The nodes are the same for all that a point sees of a
+/// reflector: a ray must know which of them its end was counted with.
+const STRAYS: f64 = 0.1;
 
 /// What was measured at one point.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -50,7 +51,7 @@ pub(crate) fn residual(
     reflecting: &[Rgb],
     tolerance: f64,
 ) -> Vec<ResidualPoint> {
-    let gather = Gather::with_source_error(scene, solution, SOURCE_SHARE * tolerance);
+    let gather = Gather::with_even_nodes(scene, solution, STRAYS);
     let bvh = Bvh::of_triangles((0..fine.triangles()).map(|triangle| fine.corners(triangle)).collect());
     let mean = colour_mean(solution.mean_irradiance);
     let misfits = misfits(scene, solution, fine, reflecting);
@@ -58,20 +59,26 @@ pub(crate) fn residual(
         Interpolant::through(fine.table.triangles[triangle].map(|sample| samples[sample as usize])).evaluate(s, t)
     };
     let polygon_of = |triangle: u32| fine.leaves[fine.mesh.triangles[triangle as usize].leaf as usize].polygon;
-    // By how much the bake at the end of a ray differs from the plane of the seen node that it lies on.
-    let correction = |origin: DVec3, direction: DVec3, polygon: u32, seen: &HashMap<NodeId, ElementLight>| {
-        let hit = bvh.closest_hit_among(&Ray { origin, direction }, |triangle| polygon_of(triangle) != polygon)?;
+    let other_sides = other_sides(scene);
+    let normals: Vec<DVec3> = scene.polygon_ids().map(|polygon| scene.plane(polygon).normal).collect();
+    // By how much the bake at the end of a ray differs from the mean of the seen node that it lies on.
+    let correction = |origin: DVec3, direction: DVec3, polygon: u32, seen: &HashSet<NodeId>| {
+        // A ray neither meets the surface that it starts on, nor the back of a surface whose other side is in the same place.
+        let meets = |triangle: u32| {
+            let met = polygon_of(triangle);
+            let faces = normals[met as usize].dot(direction) < 0.0;
+            met != polygon
+                && other_sides[polygon as usize] != Some(met)
+                && (faces || other_sides[met as usize].is_none())
+        };
+        let hit = bvh.closest_hit_among(&Ray { origin, direction }, meets)?;
         if hit.normal.dot(direction) >= 0.0 {
             return None;
         }
         let leaf = &fine.leaves[fine.mesh.triangles[hit.id as usize].leaf as usize];
-        let node = solution.elements.ancestors(leaf.element).find(|node| seen.contains_key(node));
-        let plane = node.map_or(Rgb::ZERO, |node| {
-            let patch = &solution.elements.patches[solution.elements.patch_of(node).unwrap_or_default() as usize];
-            let at = origin + direction * hit.distance - solution.elements.nodes[node as usize].centre;
-            seen[&node].linear(patch.along(at))
-        });
-        Some(scene.material(leaf.polygon).reflectance * (value(reflecting, hit.id as usize, hit.s, hit.t) - plane))
+        let node = solution.elements.ancestors(leaf.element).find(|node| seen.contains(node));
+        let known = node.map_or(Rgb::ZERO, |node| solution.light[node as usize].irradiance);
+        Some(scene.material(leaf.polygon).reflectance * (value(reflecting, hit.id as usize, hit.s, hit.t) - known))
     };
     points(fine)
         .into_par_iter()
@@ -82,11 +89,12 @@ pub(crate) fn residual(
             let element = gather.over(leaf.element);
             let mut seen = Vec::new();
             element.seen_nodes(position, DVec3::ZERO, &mut seen);
+            seen.iter_mut().for_each(|seen| seen.offset = DVec2::ZERO);
             let known = element.emitted(position, DVec3::ZERO) + gather.irradiance_from(&seen);
-            let planes = seen.iter().map(|seen| (seen.node, solution.light[seen.node as usize])).collect();
-            let normal = scene.plane(leaf.polygon).normal;
+            let seen_nodes: HashSet<NodeId> = seen.iter().map(|seen| seen.node).collect();
+            let normal = normals[leaf.polygon as usize];
             let mut random = ChaCha8Rng::seed_from_u64(number as u64);
-            let differs = |direction| correction(position, direction, leaf.polygon, &planes).unwrap_or(Rgb::ZERO);
+            let differs = |direction| correction(position, direction, leaf.polygon, &seen_nodes).unwrap_or(Rgb::ZERO);
             // A ray scatters by what it finds, and finds a node as often as its form factor says: known before the first ray,
             // where a few rays would miss the small bright node that matters most.
             let square = |seen: &SeenNode| seen.form_factor * misfits[seen.node as usize];
@@ -108,7 +116,7 @@ pub(crate) fn residual(
         .collect()
 }
 
-/// By node, the mean square of what the radiosity of the bake differs by from the node's plane, averaged over the colours.
+/// By node, the mean square of what the radiosity of the bake differs by from the node's mean, averaged over the colours.
 fn misfits(scene: &Scene, solution: &Solution, fine: &FineMesh, reflecting: &[Rgb]) -> Vec<f64> {
     let elements = &solution.elements;
     let mut sums = vec![0.0; elements.nodes.len()];
@@ -117,16 +125,11 @@ fn misfits(scene: &Scene, solution: &Solution, fine: &FineMesh, reflecting: &[Rg
     }
     for (triangle, samples) in fine.table.triangles.iter().enumerate() {
         let leaf = &fine.leaves[fine.mesh.triangles[triangle].leaf as usize];
-        let patch = &elements.patches[elements.patch_of(leaf.element).unwrap_or_default() as usize];
         let reflectance = scene.material(leaf.polygon).reflectance;
-        let corners = fine.corners(triangle);
-        let part = scene::area_vector(&corners).length() / SAMPLE_BARYCENTRICS.len() as f64;
-        for (&place, &sample) in SAMPLE_BARYCENTRICS.iter().zip(samples) {
-            let position = at(corners, place);
+        let part = scene::area_vector(&fine.corners(triangle)).length() / samples.len() as f64;
+        for &sample in samples {
             for node in elements.ancestors(leaf.element).filter(|&node| elements.patch_of(node).is_some()) {
-                let offset = patch.along(position - elements.nodes[node as usize].centre);
-                let difference =
-                    reflectance * (reflecting[sample as usize] - solution.light[node as usize].linear(offset));
+                let difference = reflectance * (reflecting[sample as usize] - solution.light[node as usize].irradiance);
                 sums[node as usize] += part * colour_mean(difference * difference);
             }
         }

@@ -1,9 +1,7 @@
 //! Points on the surfaces of a scene: how a path goes from one to the next, and how to spread many by area.
 
-use std::collections::BTreeMap;
-
 use glam::DVec3;
-use scene::{Bvh, Plane, Ray, Scene};
+use scene::{Bvh, Plane, Ray, Scene, other_sides};
 
 use crate::sequence::{Kronecker, Stream};
 
@@ -53,7 +51,7 @@ pub(crate) struct Surfaces<'a> {
 impl<'a> Surfaces<'a> {
     pub fn new(scene: &'a Scene, bvh: &'a Bvh) -> Self {
         let planes: Vec<_> = scene.polygon_ids().map(|polygon| scene.plane(polygon)).collect();
-        let other_sides = other_sides(scene, &planes);
+        let other_sides = other_sides(scene);
         Self { scene, bvh, planes, other_sides, rounding: ROUNDING * scene.size() }
     }
 
@@ -104,24 +102,6 @@ impl<'a> Surfaces<'a> {
         let position = position - plane.normal * plane.distance(position);
         Some(SurfacePoint { position, normal: plane.normal, polygon })
     }
-}
-
-/// Pairs of polygons with the same corners and opposite normals.
-fn other_sides(scene: &Scene, planes: &[Plane]) -> Vec<Option<u32>> {
-    let mut by_corners: BTreeMap<Vec<u32>, Vec<u32>> = BTreeMap::new();
-    for polygon in scene.polygon_ids() {
-        let mut corners = scene.corners[scene.polygons[polygon as usize].corner_range()].to_vec();
-        corners.sort_unstable();
-        by_corners.entry(corners).or_default().push(polygon);
-    }
-    let mut other_sides = vec![None; scene.polygons.len()];
-    for same in by_corners.values() {
-        for &polygon in same {
-            let opposite = |&other: &u32| planes[other as usize].normal.dot(planes[polygon as usize].normal) < 0.0;
-            other_sides[polygon as usize] = same.iter().copied().find(opposite);
-        }
-    }
-    other_sides
 }
 
 /// Distance in its plane from a point to the border of a polygon, metres; negative outside.

@@ -26,4 +26,4 @@ pub use material::Material;
 pub use polygon::{Plane, Polygon, area_vector, centroid, is_convex};
 pub use ray::{Ray, intersect_triangle};
 pub use rgb::{Rgb, luminance};
-pub use scene::{LARGEST_COORDINATE, Scene, SceneError};
+pub use scene::{LARGEST_COORDINATE, Scene, SceneError, other_sides};

@@ -1,5 +1,7 @@
 //! A scene: polygons over shared vertices, their materials, and the cameras stored with them.
 
+use std::collections::BTreeMap;
+
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
@@ -143,4 +145,23 @@ impl Scene {
         }
         Ok(())
     }
+}
+
+/// By polygon, the one that has the same corners and the opposite front, if any: the other side of a two-sided surface.
+pub fn other_sides(scene: &Scene) -> Vec<Option<u32>> {
+    let planes: Vec<Plane> = scene.polygon_ids().map(|polygon| scene.plane(polygon)).collect();
+    let mut by_corners: BTreeMap<Vec<u32>, Vec<u32>> = BTreeMap::new();
+    for polygon in scene.polygon_ids() {
+        let mut corners = scene.corners[scene.polygons[polygon as usize].corner_range()].to_vec();
+        corners.sort_unstable();
+        by_corners.entry(corners).or_default().push(polygon);
+    }
+    let mut other_sides = vec![None; scene.polygons.len()];
+    for same in by_corners.values() {
+        for &polygon in same {
+            let opposite = |&other: &u32| planes[other as usize].normal.dot(planes[polygon as usize].normal) < 0.0;
+            other_sides[polygon as usize] = same.iter().copied().find(opposite);
+        }
+    }
+    other_sides
 }

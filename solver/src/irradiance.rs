@@ -43,10 +43,18 @@ pub struct Gather<'a> {
     pub(crate) solution: &'a Solution,
     pub(crate) geometry: Geometry,
     pub(crate) solids: Solids,
-    /// Irradiance, luminance, W·m⁻², that one reflector may misplace at a point.
-    budget: f64,
+    opening: Opening,
     /// Mean luminance of the radiosity that each polygon reflects, W·m⁻².
     radiosity: Vec<f64>,
+}
+
+/// Which nodes of a reflector are opened. Luminances, W·m⁻².
+#[derive(Clone, Copy)]
+enum Opening {
+    /// Those that may misplace more irradiance than this at the point that asks.
+    ByIrradiance(f64),
+    /// Those whose radiosity strays from their plane by more than this, whoever asks.
+    ByRadiosity(f64),
 }
 
 /// What a gather needs to know of a link.
@@ -70,6 +78,16 @@ impl<'a> Gather<'a> {
     /// irradiance.
     pub fn with_source_error(scene: &'a Scene, solution: &'a Solution, source_error: f64) -> Self {
         let budget = source_error * luminance(solution.mean_irradiance);
+        Self::with(scene, solution, Opening::ByIrradiance(budget))
+    }
+
+    /// The same with the same nodes of a reflector for every point that asks: those over which its radiosity strays from a
+    /// plane by no more than a fraction of the scene's mean irradiance. Nothing is too dim to be looked at exactly.
+    pub fn with_even_nodes(scene: &'a Scene, solution: &'a Solution, strays: f64) -> Self {
+        Self::with(scene, solution, Opening::ByRadiosity(strays * luminance(solution.mean_irradiance)))
+    }
+
+    fn with(scene: &'a Scene, solution: &'a Solution, opening: Opening) -> Self {
         let radiosity = |polygon| {
             let area = |root: NodeId| solution.elements.nodes[root as usize].area;
             let power = |root: NodeId| luminance(solution.light[root as usize].irradiance) * area(root);
@@ -79,7 +97,7 @@ impl<'a> Gather<'a> {
         let radiosity = scene.polygon_ids().map(radiosity).collect();
         let geometry = Geometry::new(scene);
         let solids = Solids::new(scene, &geometry);
-        Self { scene, solution, geometry, solids, budget, radiosity }
+        Self { scene, solution, geometry, solids, opening, radiosity }
     }
 
     /// How other polygons touch a point of a polygon, on its front.
@@ -147,14 +165,27 @@ impl<'a> Gather<'a> {
         reflectance * solution.light[node as usize].deviation * form_factor
     }
 
-    /// Irradiance, luminance, W·m⁻², that one reflector may misplace at a point.
+    /// Irradiance, luminance, W·m⁻², that one reflector may misplace at a point; nothing where that is not what decides.
     pub fn budget(&self) -> f64 {
-        self.budget
+        match self.opening {
+            Opening::ByIrradiance(budget) => budget,
+            Opening::ByRadiosity(_) => 0.0,
+        }
+    }
+
+    /// Whether a node is opened for a point that has a form factor to it, of which the plane misplaces the `curved` part.
+    pub(crate) fn opens(&self, node: NodeId, form_factor: f64, curved: f64) -> bool {
+        let has_parts = self.solution.elements.nodes[node as usize].child_count > 0;
+        has_parts
+            && match self.opening {
+                Opening::ByIrradiance(budget) => self.misplaced(node, form_factor) * curved > budget,
+                Opening::ByRadiosity(strays) => self.misplaced(node, 1.0) > strays,
+            }
     }
 
     /// Whether a reflector is no more at a point than what it may misplace there, for its form factor if nothing hides it.
     pub(crate) fn is_dim(&self, polygon: u32, form_factor: f64) -> bool {
-        form_factor * self.radiosity[polygon as usize] <= self.budget
+        form_factor * self.radiosity[polygon as usize] <= self.budget()
     }
 
     fn over_sources(&'a self, element: NodeId, wanted: impl Fn(u32) -> bool) -> LeafGather<'a> {
@@ -190,7 +221,11 @@ impl<'a> Gather<'a> {
             if source.roots.len() == solution.patches_of(source.polygon).len() {
                 sources.push(source);
             } else {
-                let part = |&root: &NodeId| Source { roots: vec![root], part: Some(root), ..source.clone() };
+                let part = |&(root, visibility): &(NodeId, f64)| Source {
+                    roots: vec![(root, visibility)],
+                    part: Some(root),
+                    ..source.clone()
+                };
                 sources.extend(source.roots.iter().map(part));
             }
         }
@@ -205,12 +240,14 @@ impl<'a> Gather<'a> {
         let mut blockers: Vec<u32> = lists.flat_map(|list| self.solution.blockers.get(list)).copied().collect();
         blockers.sort_unstable();
         blockers.dedup();
-        let patches = links.chunk_by(|a, b| a.patch == b.patch).map(|links| links[0].patch);
-        let roots = patches.map(|patch| self.solution.elements.patches[patch as usize].root).collect();
-        let (all, visible) =
-            links.iter().fold((0.0, 0.0), |sum, link| (sum.0 + link.form_factor, sum.1 + link.visible));
-        let visibility = if all > 0.0 { visible / all } else { 0.0 };
-        Source { polygon: links[0].polygon, roots, part: None, blockers, before: OnceCell::new(), visibility }
+        let root = |links: &[LinkSummary]| {
+            let (all, visible) =
+                links.iter().fold((0.0, 0.0), |sum, link| (sum.0 + link.form_factor, sum.1 + link.visible));
+            let root = self.solution.elements.patches[links[0].patch as usize].root;
+            (root, if all > 0.0 { visible / all } else { 0.0 })
+        };
+        let roots = links.chunk_by(|a, b| a.patch == b.patch).map(root).collect();
+        Source { polygon: links[0].polygon, roots, part: None, blockers, before: OnceCell::new() }
     }
 
     /// Irradiance at a position in the plane of a polygon, W·m⁻²; `inward` is the direction in the plane from whose

@@ -9,6 +9,7 @@
 use std::f64::consts::PI;
 
 use glam::DVec3;
+use mesher::BakeOptions;
 use scene::{Rgb, Scene};
 use solver::SolveOptions;
 
@@ -231,7 +232,8 @@ fn interreflection() -> Vec<Case> {
         let reflectance = Rgb::from_array(std::array::from_fn(|i| chunk.get(i).map_or(0.0, |row| row.0)));
         let scene = room_with_square(far, reflectance, FLUX);
         let surface = area(&scene);
-        let direct = Lit::solve_with(scene.clone(), &SolveOptions { bounces: Some(0), ..SolveOptions::default() });
+        let direct_only = SolveOptions { bounces: Some(0), ..SolveOptions::default() };
+        let direct = Lit::solve_with(scene.clone(), &direct_only, BakeOptions::default().tolerance);
         let all = Lit::solve(scene);
         let indirect = all.solution.mean_irradiance - direct.solution.mean_irradiance;
         let interpolated = all.bake().mean_irradiance();

@@ -34,6 +34,9 @@ const BALANCE_BAKED: Group = Group { name: "energy balance, baked, W", source: "
 /// longer and brings the elements nearer.
 const FINE_LINK_ERROR: f64 = 0.02;
 
+/// Tolerance of the bake that goes with it.
+const FINE_TOLERANCE: f64 = 1e-3;
+
 /// Exitance of the furnaces, W·m⁻².
 const EXITANCE: f64 = 2.0;
 
@@ -83,7 +86,8 @@ fn furnace() -> Vec<Case> {
     let scene = room.polygons(&cuboid(DVec3::ZERO, DVec3::new(3.0, 2.0, 1.5))).scene();
     let points = points_on(&scene);
     let default = Lit::solve(scene.clone());
-    let lit = Lit::solve_with(scene, &SolveOptions { link_error: Some(FINE_LINK_ERROR), ..SolveOptions::default() });
+    let fine = SolveOptions { link_error: Some(FINE_LINK_ERROR), ..SolveOptions::default() };
+    let lit = Lit::solve_with(scene, &fine, FINE_TOLERANCE);
     [
         furnace_cases(&FURNACE, &on_elements(&lit)),
         furnace_cases(&FURNACE_GATHERED, &lit.gather(points.iter().copied())),

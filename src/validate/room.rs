@@ -104,14 +104,15 @@ pub struct Lit {
 impl Lit {
     /// Solves a scene's light with the program's default options.
     pub fn solve(scene: Scene) -> Self {
-        Self::solve_with(scene, &SolveOptions::default())
+        Self::solve_with(scene, &SolveOptions::default(), BakeOptions::default().tolerance)
     }
 
-    /// Solves a scene's light.
-    pub fn solve_with(scene: Scene, options: &SolveOptions) -> Self {
+    /// Solves a scene's light, and bakes it to a tolerance.
+    pub fn solve_with(scene: Scene, options: &SolveOptions, tolerance: f64) -> Self {
         let solution = solver::solve(&scene, options, &|_| ());
         let control = Control { progress: &|_| (), stop: &|| false };
-        let bake = mesher::bake(&scene, solution.clone(), &BakeOptions::default(), control);
+        let bake =
+            mesher::bake(&scene, solution.clone(), &BakeOptions { tolerance, ..BakeOptions::default() }, control);
         let bvh = Bvh::of_scene(&scene);
         Self { scene, solution, bake, bvh }
     }
