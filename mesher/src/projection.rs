@@ -14,6 +14,9 @@ pub(crate) struct Projection {
     leaves: Vec<LeafWeights>,
 }
 
+/// Corners of a triangle, from the centre of its leaf, metres, and its samples.
+type Part = ([DVec2; 3], [u32; 6]);
+
 struct LeafWeights {
     element: NodeId,
     /// Sample, and its weight in the mean and in the gradients along u and v, m⁻¹.
@@ -64,7 +67,7 @@ impl Projection {
 ///
 /// With λ the barycentrics of a triangle of area A, a vertex' sample has the basis function λᵢ(2λᵢ−1), a midpoint's 4λᵢλⱼ.
 /// Their integrals against 1 and λ follow from ∫ λ₁ᵃ λ₂ᵇ λ₃ᶜ = 2A a! b! c! / (a+b+c+2)!.
-fn plane_weights(triangles: impl Iterator<Item = ([DVec2; 3], [u32; 6])>) -> Vec<(u32, f64, DVec2)> {
+fn plane_weights(triangles: impl Iterator<Item = Part>) -> Vec<(u32, f64, DVec2)> {
     let mut moments: Vec<(u32, f64, DVec2)> = Vec::new();
     let (mut area, mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0, 0.0);
     for ([a, b, c], samples) in triangles {
@@ -105,14 +108,14 @@ mod tests {
     use super::*;
 
     /// Two triangles of a trapezium about its centroid, and samples at their stations.
-    fn trapezium() -> (Vec<([DVec2; 3], [u32; 6])>, Vec<DVec2>) {
+    fn trapezium() -> ([Part; 2], Vec<DVec2>) {
         let corners = [(0., 0.), (4., 0.), (3., 2.), (0., 2.)].map(|(x, y)| DVec2::new(x, y));
         let (first, second) = ([0, 1, 2], [0, 2, 3]);
         let centroid = |t: [usize; 3]| t.map(|i| corners[i]).iter().sum::<DVec2>() / 3.0;
         let middle = (centroid(first) * 4.0 + centroid(second) * 3.0) / 7.0;
         let [a, b, c, d] = corners.map(|corner| corner - middle);
         let points = vec![a, (a + b) / 2.0, b, (b + c) / 2.0, c, (a + c) / 2.0, (c + d) / 2.0, d, (a + d) / 2.0];
-        (vec![([a, b, c], [0, 1, 2, 3, 4, 5]), ([a, c, d], [0, 5, 4, 6, 7, 8])], points)
+        ([([a, b, c], [0, 1, 2, 3, 4, 5]), ([a, c, d], [0, 5, 4, 6, 7, 8])], points)
     }
 
     #[test]
