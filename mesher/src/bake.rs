@@ -49,11 +49,8 @@ const AIM: f64 = 0.6;
 /// Meshes in one round at most. Each divides what the last one found wanting.
 const MESHES: u32 = 12;
 
-/// What a round must bring the error down to, as a part of the last one's, for another to be worth its time.
-const WORTHWHILE: f64 = 1.0;
-
-/// Rounds at most: by then a share is a twentieth of the tolerance, and the fault lies elsewhere.
-const ROUNDS: u32 = 5;
+/// Rounds at most: by then a share is a small part of the tolerance, and the fault lies elsewhere.
+const ROUNDS: u32 = 6;
 
 /// Leaves with a cell shorter than this fraction of the scene's size are not divided: at a corner of contact the error falls
 /// no faster than its area.
@@ -71,7 +68,7 @@ const FIRST_SOURCE_SHARE: f64 = 0.12;
 /// What that part shrinks by from round to round where the bake as a whole is too dark or too bright by more than `BIAS` of
 /// the tolerance.
 const NEXT_SOURCE_SHARE: f64 = 0.3;
-const BIAS: f64 = 0.5;
+const BIAS: f64 = 0.25;
 
 /// The part of the tolerance, relative to the scene's mean irradiance, that all further exchanges may still change a sample by:
 /// the last one's change, summed over the bounces to come.
@@ -152,6 +149,7 @@ pub fn bake(scene: &Scene, solution: Solution, options: &BakeOptions, control: C
         reflectance,
     };
     let mut statistics = BakeStatistics { min_weight, ..BakeStatistics::default() };
+    let mut without_gain = 0;
     let mut best: Option<(FineMesh, Vec<Rgb>, BakedError)> = None;
     let (fine, samples, error) = loop {
         let fine = rounds.mesh();
@@ -161,22 +159,26 @@ pub fn bake(scene: &Scene, solution: Solution, options: &BakeOptions, control: C
         let (error, bias) = measured(&points, options.tolerance, rounds.reflectance);
         statistics.rounds += 1;
         let too_many = fine.triangles() > options.max_triangles;
-        if too_many && let Some(best) = best {
-            break best;
-        }
         let missed = |error: &BakedError| (error.rms / options.tolerance).max(error.p99 / (P99 * options.tolerance));
-        // What finer leaves do not mend is not theirs to mend.
-        let stalls = best.as_ref().is_some_and(|best| missed(&error) > WORTHWHILE * missed(&best.2));
-        if error.holds || too_many || stalls || statistics.rounds == ROUNDS || (control.stop)() {
-            break (fine, samples, error);
+        let (last, stop) = (missed(&error), error.holds || too_many || statistics.rounds == ROUNDS || (control.stop)());
+        if best.as_ref().is_none_or(|(.., least)| last < missed(least) && !too_many) {
+            best = Some((fine, samples, error));
+            without_gain = 0;
+        } else {
+            without_gain += 1;
+        }
+        // What finer leaves do not mend twice is not theirs to mend; once it may have been a few points.
+        if (stop || without_gain == 2)
+            && let Some(best) = best
+        {
+            break best;
         }
         if bias > BIAS * options.tolerance {
             rounds.source_share *= NEXT_SOURCE_SHARE;
         } else {
-            rounds.share *= (NEXT_AIM / missed(&error)).clamp(NEXT_SHARE[0], NEXT_SHARE[1]);
+            rounds.share *= (NEXT_AIM / last).clamp(NEXT_SHARE[0], NEXT_SHARE[1]);
         }
         (control.progress)(1.0 - 0.5f64.powi(statistics.rounds as i32));
-        best = Some((fine, samples, error));
     };
     (control.progress)(1.0);
     let samples: Vec<Vec3> = samples.iter().map(|value| value.max(Rgb::ZERO).as_vec3()).collect();
@@ -191,9 +193,11 @@ pub fn bake(scene: &Scene, solution: Solution, options: &BakeOptions, control: C
         mesh: fine.mesh.statistics,
         ..statistics
     };
+    let solution = &rounds.solution;
+    let light = if solution.reflects() { &solution.light } else { &solution.irradiance };
     let element = |leaf: &Leaf| BakedElement {
         polygon: leaf.polygon,
-        irradiance: rounds.solution.light[leaf.element as usize].irradiance.as_vec3(),
+        irradiance: light[leaf.element as usize].irradiance.as_vec3(),
     };
     let baked = Baked {
         scene: scene.clone(),
@@ -345,9 +349,8 @@ fn measured(points: &[ResidualPoint], tolerance: f64, reflectance: f64) -> (Bake
     let mean_excess = points.iter().map(excess).sum::<f64>() / count;
     let spread = points.iter().map(|point| (excess(point) - mean_excess).powi(2)).sum::<f64>() / count;
     let limit = mean_excess.abs() + CONFIDENCE * (spread / count).sqrt();
-    let bias = if mean > 0.0 { limit / mean } else { 0.0 };
-    let sum_of_bounces = bias / (1.0 - reflectance);
-    let amplified = sum_of_bounces.powi(2) - bias * bias;
+    let sum_of_bounces = |excess: f64| if mean > 0.0 { excess / mean / (1.0 - reflectance) } else { 0.0 };
+    let amplified = sum_of_bounces(limit).powi(2) * reflectance * (2.0 - reflectance);
     let scatter = points.iter().map(|point| (product(point) - mean_square).powi(2)).sum::<f64>() / count;
     let limit = mean_square + CONFIDENCE * (scatter / count).sqrt();
     let errors: Vec<f64> = points
@@ -366,7 +369,7 @@ fn measured(points: &[ResidualPoint], tolerance: f64, reflectance: f64) -> (Bake
         points: points.len() as u64,
         holds: rms <= tolerance && p99 <= P99 * tolerance,
     };
-    (error, sum_of_bounces)
+    (error, sum_of_bounces(mean_excess.abs()))
 }
 
 /// Reflectance that a mean is taken for at most: beyond it nothing can be said by a sum.
