@@ -1,19 +1,19 @@
 //! Solution → Baked: rounds of meshing, exchange of light and measurement until the bake keeps its tolerance.
 //!
-//! A round divides the leaves on which light from emitters is interpolated badly (`fine_mesh`), then those on which light over
-//! reflectors is (`reflected_light`), and then measures the whole (`residual`). Where that misses the tolerance, the next round
-//! asks both for less. Rounds are global: what is divided depends on the light alone, never on threads.
+//! After each round (`rounds`) the whole is measured (`residual`, `claimed_error`). Where it misses the tolerance, the next
+//! round asks for less. Rounds are global: what is divided depends on the light alone, never on threads.
 
 use glam::Vec3;
 use rayon::prelude::*;
 use scene::{Baked, BakedElement, BakedError, BakedTriangle, HalfEdges, Provenance, Rgb, Scene};
-use solver::{NodeId, Solution};
+use solver::Solution;
 
+use crate::claimed_error::{P99, mean_reflectance, measured};
 use crate::fine_mesh::FineMesh;
-use crate::probe::{colour_mean, percentile};
-use crate::refinement::worst;
-use crate::reflected_light::{Exchange, ReflectedLight};
-use crate::residual::{ResidualPoint, residual};
+use crate::probe::colour_mean;
+use crate::reflected_light::ReflectedLight;
+use crate::residual::residual;
+use crate::rounds::Rounds;
 use crate::{Discontinuity, Leaf, Mesh, MeshStatistics, Progress, Weight, discontinuities};
 
 /// What a bake is asked for.
@@ -43,18 +43,8 @@ const FIRST_SHARE: f64 = 0.36;
 const NEXT_AIM: f64 = 0.85;
 const NEXT_SHARE: [f64; 2] = [0.5, 0.9];
 
-/// Of the error that is allowed, as much is aimed at when leaves are chosen: their parts keep some of it.
-const AIM: f64 = 0.6;
-
-/// Meshes in one round at most. Each divides what the last one found wanting.
-const MESHES: u32 = 12;
-
 /// Rounds at most: by then a share is a small part of the tolerance, and the fault lies elsewhere.
 const ROUNDS: u32 = 6;
-
-/// Leaves with a cell shorter than this fraction of the scene's size are not divided: at a corner of contact the error falls
-/// no faster than its area.
-const SMALLEST_LEAF: f64 = 1e-3;
 
 /// Length of the elements that light over reflectors is found on first, as a fraction of the scene's size. Longer ones miss
 /// what lies between their probes, shorter ones cost more than a room needs.
@@ -69,10 +59,6 @@ const FIRST_SOURCE_SHARE: f64 = 0.12;
 /// the tolerance.
 const NEXT_SOURCE_SHARE: f64 = 0.3;
 const BIAS: f64 = 0.25;
-
-/// The part of the tolerance, relative to the scene's mean irradiance, that all further exchanges may still change a sample by:
-/// the last one's change, summed over the bounces to come.
-const RESIDUAL_SHARE: f64 = 0.02;
 
 impl Default for BakeOptions {
     /// One percent, and the paper's k.
@@ -147,6 +133,7 @@ pub fn bake(scene: &Scene, solution: Solution, options: &BakeOptions, control: C
         share: FIRST_SHARE,
         source_share: FIRST_SOURCE_SHARE,
         reflectance,
+        reflected_errors: Vec::new(),
     };
     let mut statistics = BakeStatistics { min_weight, ..BakeStatistics::default() };
     let mut without_gain = 0;
@@ -199,11 +186,12 @@ pub fn bake(scene: &Scene, solution: Solution, options: &BakeOptions, control: C
         polygon: leaf.polygon,
         irradiance: light[leaf.element as usize].irradiance.as_vec3(),
     };
+    let triangle_errors = rounds.triangle_errors(&fine, &samples);
     let baked = Baked {
         scene: scene.clone(),
         vertices,
         samples,
-        triangle_errors: vec![0.0; triangles.len()],
+        triangle_errors,
         triangles,
         elements: fine.leaves.iter().map(element).collect(),
         lines: fine.lines,
@@ -211,183 +199,6 @@ pub fn bake(scene: &Scene, solution: Solution, options: &BakeOptions, control: C
         provenance: Provenance::default(),
     };
     Bake { baked, solution: rounds.solution, statistics }
-}
-
-/// What goes from round to round.
-struct Rounds<'a> {
-    scene: &'a Scene,
-    options: &'a BakeOptions,
-    solution: Solution,
-    found: Vec<Vec<Discontinuity>>,
-    reflected: ReflectedLight,
-    /// Mean irradiance of all surfaces, averaged over the colours, W·m⁻².
-    mean: f64,
-    /// The share of the tolerance that each of the two kinds of light may use up in this round.
-    share: f64,
-    /// The part of the tolerance that a row may misplace on account of each reflector.
-    source_share: f64,
-    /// The part of the light on all surfaces that they reflect, 0..=1.
-    reflectance: f64,
-}
-
-impl Rounds<'_> {
-    /// One round: divides leaves until both kinds of light are interpolated well enough; the mesh of the last division.
-    fn mesh(&mut self) -> FineMesh {
-        let mut fine = self.mesh_emitted();
-        if !self.solution.reflects() {
-            return fine;
-        }
-        for _ in 0..MESHES {
-            let exchange = Exchange {
-                source_error: self.source_share * self.options.tolerance,
-                residual: RESIDUAL_SHARE * self.options.tolerance * self.mean * (1.0 - self.reflectance),
-            };
-            self.reflected.solve(self.scene, &mut self.solution, &fine, &exchange);
-            let errors = self.reflected.leaf_errors(self.scene, &self.solution, &exchange);
-            let leaves: Vec<(NodeId, f64)> = errors
-                .iter()
-                .map(|error| {
-                    let own = error.irradiance + colour_mean(self.solution.direct[error.element as usize].irradiance);
-                    (error.element, error.error / own.max(self.mean))
-                })
-                .collect();
-            let divided = self.wanting(&leaves);
-            if divided.is_empty() || fine.triangles() > self.options.max_triangles {
-                break;
-            }
-            if self.reflected.divide(&mut self.solution, &divided) {
-                fine = self.fine_mesh();
-            }
-        }
-        fine
-    }
-
-    /// The mesh of the solution's leaves as they are.
-    fn fine_mesh(&self) -> FineMesh {
-        let BakeOptions { discontinuities, weight, .. } = *self.options;
-        FineMesh::new(self.scene, &self.solution, &self.found, weight, discontinuities as usize)
-    }
-
-    /// Irradiance at the samples of a mesh, W·m⁻².
-    fn samples(&self, fine: &FineMesh) -> Vec<Rgb> {
-        if self.solution.reflects() { self.reflected.irradiance(&self.solution, fine) } else { fine.emitted.clone() }
-    }
-
-    /// Divides leaves until light from emitters is interpolated well enough.
-    fn mesh_emitted(&mut self) -> FineMesh {
-        let mut fine = self.fine_mesh();
-        for _ in 0..MESHES {
-            let mut leaves: Vec<(NodeId, f64)> = fine.leaves.iter().map(|leaf| (leaf.element, 0.0)).collect();
-            for (triangle, (error, emitted)) in fine.probe_emitted(self.scene, &self.solution).into_iter().enumerate() {
-                let leaf = fine.mesh.triangles[triangle].leaf as usize;
-                let element = leaves[leaf].0;
-                let own = emitted + colour_mean(self.solution.reflected_over_links(element, glam::DVec2::ZERO));
-                let part = scene::area_vector(&fine.corners(triangle)).length()
-                    / self.solution.elements.nodes[element as usize].area;
-                leaves[leaf].1 += part * (error / own.max(self.mean)).powi(2);
-            }
-            leaves.iter_mut().for_each(|leaf| leaf.1 = leaf.1.sqrt());
-            let divided = self.wanting(&leaves);
-            if divided.is_empty() || fine.triangles() > self.options.max_triangles {
-                break;
-            }
-            for leaf in divided {
-                self.solution.subdivide(leaf);
-            }
-            fine = self.fine_mesh();
-        }
-        fine
-    }
-
-    /// Of elements with their relative errors, those that are to be divided so that this round's share is kept; ascending.
-    fn wanting(&self, leaves: &[(NodeId, f64)]) -> Vec<NodeId> {
-        let elements = &self.solution.elements;
-        let area = |leaf: NodeId| elements.nodes[leaf as usize].area;
-        let total: f64 = leaves.iter().map(|&(leaf, _)| area(leaf)).sum();
-        let allowed = (self.share * self.options.tolerance).powi(2) * total;
-        let smallest = SMALLEST_LEAF * self.scene.size();
-        let weighted: Vec<f64> = leaves
-            .iter()
-            .map(|&(leaf, error)| {
-                let divides = elements.cell_length(leaf) > smallest && error.is_finite();
-                if divides { error * error * area(leaf) } else { 0.0 }
-            })
-            .collect();
-        if weighted.iter().sum::<f64>() <= allowed {
-            return Vec::new();
-        }
-        let mut divided: Vec<NodeId> = worst(&weighted, AIM * allowed).into_iter().map(|i| leaves[i].0).collect();
-        divided.sort_unstable();
-        divided
-    }
-}
-
-/// The error that is accepted at 99 % of the area, in tolerances.
-const P99: f64 = 5.0;
-
-/// One-sided 99 % of the normal distribution.
-const CONFIDENCE: f64 = 2.326;
-
-/// The error of a bake by its residual at points spread evenly by area, each relative to max(own, mean) irradiance.
-/// `reflectance` is the part of all light that is reflected. And the part of it that the bake as a whole is off by, after all
-/// bounces.
-fn measured(points: &[ResidualPoint], tolerance: f64, reflectance: f64) -> (BakedError, f64) {
-    let count = points.len() as f64;
-    if points.is_empty() {
-        return (BakedError { holds: true, ..BakedError::default() }, 0.0);
-    }
-    let mean = points.iter().map(|point| point.irradiance).sum::<f64>() / count;
-    let scale = |point: &ResidualPoint| point.irradiance.max(mean).max(f64::MIN_POSITIVE);
-    let product = |point: &ResidualPoint| {
-        let [a, b] = point.differences;
-        colour_mean(a * b) / scale(point).powi(2)
-    };
-    let mean_square = points.iter().map(product).sum::<f64>() / count;
-    // What the residual is off by on average, or may be for all that was measured, is reflected again and again: the bake is
-    // off by the sum of it.
-    let excess = |point: &ResidualPoint| colour_mean(point.differences[0] + point.differences[1]) / 2.0;
-    let mean_excess = points.iter().map(excess).sum::<f64>() / count;
-    let spread = points.iter().map(|point| (excess(point) - mean_excess).powi(2)).sum::<f64>() / count;
-    let limit = mean_excess.abs() + CONFIDENCE * (spread / count).sqrt();
-    let sum_of_bounces = |excess: f64| if mean > 0.0 { excess / mean / (1.0 - reflectance) } else { 0.0 };
-    let amplified = sum_of_bounces(limit).powi(2) * reflectance * (2.0 - reflectance);
-    let scatter = points.iter().map(|point| (product(point) - mean_square).powi(2)).sum::<f64>() / count;
-    let limit = mean_square + CONFIDENCE * (scatter / count).sqrt();
-    let errors: Vec<f64> = points
-        .iter()
-        .map(|point| {
-            let difference = (point.differences[0] + point.differences[1]) / 2.0;
-            colour_mean(difference * difference).sqrt() / scale(point)
-        })
-        .collect();
-    let p99 = percentile(&errors, &vec![1.0; errors.len()], 0.99);
-    let rms = (limit.max(0.0) + amplified).sqrt();
-    let error = BakedError {
-        rms,
-        p99,
-        max: errors.iter().copied().fold(0.0, f64::max),
-        points: points.len() as u64,
-        holds: rms <= tolerance && p99 <= P99 * tolerance,
-    };
-    (error, sum_of_bounces(mean_excess.abs()))
-}
-
-/// Reflectance that a mean is taken for at most: beyond it nothing can be said by a sum.
-const LARGEST_REFLECTANCE: f64 = 0.95;
-
-/// The part of the light on all surfaces that they reflect, 0..=1.
-fn mean_reflectance(scene: &Scene, solution: &Solution) -> f64 {
-    if !solution.reflects() {
-        return 0.0;
-    }
-    let (mut arrives, mut leaves) = (0.0, 0.0);
-    for leaf in solution.elements.leaves() {
-        let Some(polygon) = solution.elements.polygon_of(leaf) else { continue };
-        let irradiance = solution.irradiance[leaf as usize].irradiance * solution.elements.nodes[leaf as usize].area;
-        arrives += colour_mean(irradiance);
-        leaves += colour_mean(irradiance * scene.material(polygon).reflectance);
-    }
-    if arrives > 0.0 { (leaves / arrives).min(LARGEST_REFLECTANCE) } else { 0.0 }
 }
 
 /// The discontinuities on every polygon.

@@ -2,6 +2,7 @@
 
 mod arrangement;
 mod bake;
+mod claimed_error;
 mod critical_surface;
 mod discontinuity;
 mod edge_table;
@@ -17,6 +18,7 @@ mod ranking;
 mod refinement;
 mod reflected_light;
 mod residual;
+mod rounds;
 mod samples;
 #[cfg(test)]
 mod testing;

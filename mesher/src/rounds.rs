@@ -1,0 +1,158 @@
+//! One round of a bake: leaves are divided where probes find light interpolated badly, first that of emitters, then that over
+//! reflectors.
+
+use glam::{DVec2, Vec3};
+use scene::{Rgb, Scene};
+use solver::{NodeId, Solution};
+
+use crate::fine_mesh::FineMesh;
+use crate::probe::colour_mean;
+use crate::refinement::worst;
+use crate::reflected_light::{Exchange, ReflectedLight};
+use crate::{BakeOptions, Discontinuity};
+
+/// Of the error that is allowed, as much is aimed at when leaves are chosen: their parts keep some of it.
+const AIM: f64 = 0.6;
+
+/// Meshes in one round at most. Each divides what the last one found wanting.
+const MESHES: u32 = 12;
+
+/// Leaves with a cell shorter than this fraction of the scene's size are not divided: at a corner of contact the error falls
+/// no faster than its area.
+const SMALLEST_LEAF: f64 = 1e-3;
+
+/// The part of the tolerance, relative to the scene's mean irradiance, that all further exchanges may still change a sample by:
+/// the last one's change, summed over the bounces to come.
+const RESIDUAL_SHARE: f64 = 0.02;
+
+/// What goes from round to round.
+pub(crate) struct Rounds<'a> {
+    pub scene: &'a Scene,
+    pub options: &'a BakeOptions,
+    pub solution: Solution,
+    pub found: Vec<Vec<Discontinuity>>,
+    pub reflected: ReflectedLight,
+    /// Mean irradiance of all surfaces, averaged over the colours, W·m⁻².
+    pub mean: f64,
+    /// The share of the tolerance that each of the two kinds of light may use up in this round.
+    pub share: f64,
+    /// The part of the tolerance that a row may misplace on account of each reflector.
+    pub source_share: f64,
+    /// The part of the light on all surfaces that they reflect, 0..=1.
+    pub reflectance: f64,
+    /// By leaf of the front, ascending, what the coarse mesh gets wrong at its probe, W·m⁻².
+    pub reflected_errors: Vec<(NodeId, f64)>,
+}
+
+impl Rounds<'_> {
+    /// One round: divides leaves until both kinds of light are interpolated well enough; the mesh of the last division.
+    pub fn mesh(&mut self) -> FineMesh {
+        let mut fine = self.mesh_emitted();
+        if !self.solution.reflects() {
+            return fine;
+        }
+        for _ in 0..MESHES {
+            let exchange = Exchange {
+                source_error: self.source_share * self.options.tolerance,
+                residual: RESIDUAL_SHARE * self.options.tolerance * self.mean * (1.0 - self.reflectance),
+            };
+            self.reflected.solve(self.scene, &mut self.solution, &fine, &exchange);
+            let errors = self.reflected.leaf_errors(self.scene, &self.solution, &exchange);
+            self.reflected_errors = errors.iter().map(|error| (error.element, error.error)).collect();
+            self.reflected_errors.sort_unstable_by_key(|error| error.0);
+            let leaves: Vec<(NodeId, f64)> = errors
+                .iter()
+                .map(|error| {
+                    let own = error.irradiance + colour_mean(self.solution.direct[error.element as usize].irradiance);
+                    (error.element, error.error / own.max(self.mean))
+                })
+                .collect();
+            let divided = self.wanting(&leaves);
+            if divided.is_empty() || fine.triangles() > self.options.max_triangles {
+                break;
+            }
+            if self.reflected.divide(&mut self.solution, &divided) {
+                fine = self.fine_mesh();
+            }
+        }
+        fine
+    }
+
+    /// The mesh of the solution's leaves as they are.
+    fn fine_mesh(&self) -> FineMesh {
+        let BakeOptions { discontinuities, weight, .. } = *self.options;
+        FineMesh::new(self.scene, &self.solution, &self.found, weight, discontinuities as usize)
+    }
+
+    /// Irradiance at the samples of a mesh, W·m⁻².
+    pub fn samples(&self, fine: &FineMesh) -> Vec<Rgb> {
+        if self.solution.reflects() { self.reflected.irradiance(&self.solution, fine) } else { fine.emitted.clone() }
+    }
+
+    /// Divides leaves until light from emitters is interpolated well enough.
+    fn mesh_emitted(&mut self) -> FineMesh {
+        let mut fine = self.fine_mesh();
+        for _ in 0..MESHES {
+            let mut leaves: Vec<(NodeId, f64)> = fine.leaves.iter().map(|leaf| (leaf.element, 0.0)).collect();
+            for (triangle, (error, emitted)) in fine.probe_emitted(self.scene, &self.solution).into_iter().enumerate() {
+                let leaf = fine.mesh.triangles[triangle].leaf as usize;
+                let element = leaves[leaf].0;
+                let own = emitted + colour_mean(self.solution.reflected_over_links(element, DVec2::ZERO));
+                let part = scene::area_vector(&fine.corners(triangle)).length()
+                    / self.solution.elements.nodes[element as usize].area;
+                leaves[leaf].1 += part * (error / own.max(self.mean)).powi(2);
+            }
+            leaves.iter_mut().for_each(|leaf| leaf.1 = leaf.1.sqrt());
+            let divided = self.wanting(&leaves);
+            if divided.is_empty() || fine.triangles() > self.options.max_triangles {
+                break;
+            }
+            for leaf in divided {
+                self.solution.subdivide(leaf);
+            }
+            fine = self.fine_mesh();
+        }
+        fine
+    }
+
+    /// By triangle, what probes find of both kinds of light, relative to max(own, mean) irradiance.
+    pub fn triangle_errors(&self, fine: &FineMesh, samples: &[Vec3]) -> Vec<f32> {
+        let elements = &self.solution.elements;
+        let reflected = |element: NodeId| {
+            let of = |node: NodeId| self.reflected_errors.binary_search_by_key(&node, |error| error.0).ok();
+            elements.ancestors(element).find_map(of).map_or(0.0, |place| self.reflected_errors[place].1)
+        };
+        let errors = fine.probe_emitted(self.scene, &self.solution).into_iter().enumerate();
+        errors
+            .map(|(triangle, (emitted, _))| {
+                let leaf = &fine.leaves[fine.mesh.triangles[triangle].leaf as usize];
+                let own = fine.table.triangles[triangle].map(|sample| colour_mean(samples[sample as usize].as_dvec3()));
+                let own = own.iter().sum::<f64>() / own.len() as f64;
+                let scale = own.max(self.mean);
+                if scale > 0.0 { (emitted.hypot(reflected(leaf.element)) / scale) as f32 } else { 0.0 }
+            })
+            .collect()
+    }
+
+    /// Of elements with their relative errors, those that are to be divided so that this round's share is kept; ascending.
+    fn wanting(&self, leaves: &[(NodeId, f64)]) -> Vec<NodeId> {
+        let elements = &self.solution.elements;
+        let area = |leaf: NodeId| elements.nodes[leaf as usize].area;
+        let total: f64 = leaves.iter().map(|&(leaf, _)| area(leaf)).sum();
+        let allowed = (self.share * self.options.tolerance).powi(2) * total;
+        let smallest = SMALLEST_LEAF * self.scene.size();
+        let weighted: Vec<f64> = leaves
+            .iter()
+            .map(|&(leaf, error)| {
+                let divides = elements.cell_length(leaf) > smallest && error.is_finite();
+                if divides { error * error * area(leaf) } else { 0.0 }
+            })
+            .collect();
+        if weighted.iter().sum::<f64>() <= allowed {
+            return Vec::new();
+        }
+        let mut divided: Vec<NodeId> = worst(&weighted, AIM * allowed).into_iter().map(|i| leaves[i].0).collect();
+        divided.sort_unstable();
+        divided
+    }
+}
