@@ -111,7 +111,7 @@ impl Info {
             text += &format!(
                 "bake             {} triangles, {} samples, {} elements, {} discontinuities\n\
                  mean irradiance  {} W/m²\n\
-                 measured error   {:.3} % rms, {:.3} % at 99 %, {:.3} % at most, over {} points\n\
+                 measured error   {:.3} % rms, {:.3} % at 99 %, {:.3} % at most, over {} points: the tolerance is {}\n\
                  made by          {}\n",
                 bake.triangles,
                 bake.samples,
@@ -122,6 +122,7 @@ impl Info {
                 100.0 * bake.error.p99,
                 100.0 * bake.error.max,
                 bake.error.points,
+                if bake.error.holds { "kept" } else { "not kept" },
                 bake.program
             );
             for (name, value) in &bake.options {

@@ -322,3 +322,24 @@ fn an_interrupted_bake_leaves_nothing() {
     assert_eq!(bake.wait().unwrap().code(), Some(130));
     assert!(names(folder.path()).is_empty());
 }
+
+/// A bake that may not take what its tolerance needs is written all the same, marked, and the exit code says so.
+#[test]
+fn a_tolerance_that_is_out_of_reach() {
+    let folder = folder();
+    let (scene, output) = (data("scenes/cornell_box.obj"), folder.path().join("out.hlf"));
+    for limit in [["--max-triangles", "100"], ["--max-seconds", "0.001"]] {
+        let arguments = [&["bake", text(&scene), "-o", text(&output), "--tolerance", "0.001"], &limit[..]].concat();
+        let run = halflight().args(&arguments).output().unwrap();
+        let said = String::from_utf8(run.stderr).unwrap();
+        assert_eq!(run.status.code(), Some(3), "{said}");
+        assert!(said.contains("does not keep --tolerance 0.001"), "{said}");
+        let info = String::from_utf8(crate::fixture::run(&["info", text(&output)]).stdout).unwrap();
+        assert!(info.contains("the tolerance is not kept"), "{info}");
+        std::fs::remove_file(&output).unwrap();
+    }
+    for limit in [["--max-triangles", "0"], ["--max-seconds", "0"], ["--max-seconds", "nan"]] {
+        let arguments = [&["bake", text(&scene), "-o", text(&output)], &limit[..]].concat();
+        assert!(fails(2, &arguments).contains(limit[0]));
+    }
+}
