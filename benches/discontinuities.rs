@@ -58,7 +58,7 @@ fn main() {
                     by_minimum[i].push((coarseness, point));
                 }
             }
-            // With all light every polygon is a source, and w_min = 0 finds lines without end.
+            // All lines, to see what k makes of them: at one coarseness, since w_min = 0 finds very many.
             if coarseness == 1.0 {
                 for (i, weight) in WEIGHTS.into_iter().enumerate() {
                     for count in COUNTS {

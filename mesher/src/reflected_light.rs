@@ -38,7 +38,7 @@ type Station = (u32, [u64; 6]);
 /// What a sample sees of the reflectors.
 type Row = Vec<Seen>;
 
-/// A [`SeenNode`] in a quarter of the memory: f32 has the digits that light needs.
+/// A [`SeenNode`] in half of the memory: f32 has the digits that light needs.
 #[derive(Clone, Copy)]
 struct Seen {
     node: NodeId,
