@@ -6,10 +6,10 @@
 use glam::Vec3;
 use rayon::prelude::*;
 use scene::{Baked, BakedElement, BakedError, BakedTriangle, HalfEdges, Provenance, Rgb, Scene};
-use solver::Solution;
+use solver::{Solution, Visibility};
 
 use crate::claimed_error::{P99, mean_reflectance, measured};
-use crate::fine_mesh::FineMesh;
+use crate::fine_mesh::{EmittedLight, FineMesh};
 use crate::probe::colour_mean;
 use crate::reflected_light::ReflectedLight;
 use crate::residual::residual;
@@ -37,6 +37,9 @@ pub struct BakeOptions {
 /// up in the first round, as probes see it. Probes miss what lies between them, and the sum of bounces what each is off by:
 /// with more a first round seldom does, with less it takes leaves that nobody asked for.
 const FIRST_SHARE: f64 = 0.36;
+
+/// The same in a scene whose reflected light is found by rays: what these scatter by is no bias, and does not add up.
+const FIRST_SHARE_BY_RAYS: f64 = 0.7;
 
 /// What the error is aimed at where a round has missed the tolerance, as a part of the tolerance; and by how much a share
 /// shrinks for it at most and at least. Less divides too much, more asks for one round more.
@@ -126,14 +129,15 @@ pub fn bake(scene: &Scene, solution: Solution, options: &BakeOptions, control: C
     let mut rounds = Rounds {
         scene,
         options,
+        emitted: EmittedLight::default(),
         reflected: ReflectedLight::new(&solution, FRONT_LENGTH * scene.size()),
         mean: colour_mean(solution.mean_irradiance),
-        solution,
         found,
-        share: FIRST_SHARE,
+        share: if solution.visibility == Visibility::Rays { FIRST_SHARE_BY_RAYS } else { FIRST_SHARE },
         source_share: FIRST_SOURCE_SHARE,
         reflectance,
         reflected_errors: Vec::new(),
+        solution,
     };
     let mut statistics = BakeStatistics { min_weight, ..BakeStatistics::default() };
     let mut without_gain = 0;

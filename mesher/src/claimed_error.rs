@@ -57,7 +57,7 @@ pub(crate) fn measured(points: &[ResidualPoint], tolerance: f64, reflectance: f6
 }
 
 /// Reflectance that a mean is taken for at most: beyond it nothing can be said by a sum.
-const LARGEST_REFLECTANCE: f64 = 0.95;
+pub(crate) const LARGEST_REFLECTANCE: f64 = 0.95;
 
 /// The part of the light on all surfaces that they reflect, 0..=1.
 pub(crate) fn mean_reflectance(scene: &Scene, solution: &Solution) -> f64 {

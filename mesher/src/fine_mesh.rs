@@ -3,15 +3,18 @@
 //! Light straight from emitters has all of the sharp edges and costs little to find exactly; so this mesh is as fine as that
 //! light asks for, and light over reflectors is only carried over to it (`reflected_light`).
 
+use std::collections::HashMap;
+
 use glam::DVec3;
 use rayon::prelude::*;
 use scene::{DiscontinuityLine, Rgb, Scene};
 use solver::{Gather, NodeId, Solution};
 
 use crate::probe::{colour_mean, probe_point};
+use crate::samples::QueryKey;
 use crate::{
-    Discontinuity, Leaf, LeafSegment, Mesh, RankedLine, SampleQuery, SampleTable, Weight, edge_table, evaluate_samples,
-    leaf_meshes, rank, sample_table,
+    Discontinuity, Leaf, LeafSegment, Mesh, RankedLine, SampleQuery, SampleTable, Weight, edge_table, leaf_meshes,
+    rank, sample_table,
 };
 
 /// A mesh of all leaves, and what emitters send to its samples.
@@ -23,17 +26,35 @@ pub(crate) struct FineMesh {
     pub table: SampleTable,
     /// Irradiance from emitters at each sample of the table, W·m⁻².
     pub emitted: Vec<Rgb>,
+    /// The same at each triangle's probe point.
+    probed: Vec<Rgb>,
 }
 
+/// Irradiance from emitters at every point that was asked for so far, W·m⁻²: from mesh to mesh most stay.
+#[derive(Default)]
+pub(crate) struct EmittedLight(HashMap<QueryKey, Rgb>);
+
 impl FineMesh {
-    /// Meshes the solution's leaves with the `count` strongest discontinuities of each.
-    pub fn new(scene: &Scene, solution: &Solution, found: &[Vec<Discontinuity>], weight: Weight, count: usize) -> Self {
+    /// Meshes the solution's leaves with the `count` strongest discontinuities of each. An emitter that sends less than `dim` of
+    /// the scene's mean irradiance to a point need not be seen exactly.
+    pub fn new(
+        scene: &Scene,
+        solution: &Solution,
+        found: &[Vec<Discontinuity>],
+        (weight, count): (Weight, usize),
+        dim: f64,
+        known: &mut EmittedLight,
+    ) -> Self {
         let (leaves, lines) = divided_leaves(scene, solution, found, weight, count);
         let mesh = leaf_meshes(&edge_table(scene, &solution.cuts, &leaves));
-        let gather = Gather::new(scene, solution);
+        let gather = Gather::with_source_error(scene, solution, dim);
         let table = sample_table(scene, &leaves, &mesh, &|polygon, position| gather.contact(polygon, position));
-        let emitted = evaluate_samples(&table.queries, &emitted(&gather), &|_| ());
-        Self { leaves, lines, mesh, table, emitted }
+        let mut fine = Self { leaves, lines, mesh, table, emitted: Vec::new(), probed: Vec::new() };
+        let probes: Vec<SampleQuery> = (0..fine.triangles()).map(|triangle| fine.probe_query(triangle)).collect();
+        known.find(&gather, fine.table.queries.iter().chain(&probes));
+        fine.emitted = known.at(&fine.table.queries);
+        fine.probed = known.at(&probes);
+        fine
     }
 
     /// Number of triangles.
@@ -48,16 +69,13 @@ impl FineMesh {
 
     /// What the interpolation of emitters' light gets wrong at one point of every triangle that it was not fitted to,
     /// W·m⁻² averaged over the colours as a root mean square; and the exact light there, averaged over the colours.
-    pub fn probe_emitted(&self, scene: &Scene, solution: &Solution) -> Vec<(f64, f64)> {
-        let queries: Vec<SampleQuery> = (0..self.triangles()).map(|triangle| self.probe_query(triangle)).collect();
-        let gather = Gather::new(scene, solution);
-        let exact = evaluate_samples(&queries, &emitted(&gather), &|_| ());
+    pub fn probe_emitted(&self) -> Vec<(f64, f64)> {
         (0..self.triangles())
             .map(|triangle| {
                 let samples = self.table.triangles[triangle].map(|sample| self.emitted[sample as usize]);
                 let (s, t) = probe_point(triangle);
-                let difference = scene::Interpolant::through(samples).evaluate(s, t) - exact[triangle];
-                (colour_mean(difference * difference).sqrt(), colour_mean(exact[triangle]))
+                let difference = scene::Interpolant::through(samples).evaluate(s, t) - self.probed[triangle];
+                (colour_mean(difference * difference).sqrt(), colour_mean(self.probed[triangle]))
             })
             .collect()
     }
@@ -71,12 +89,24 @@ impl FineMesh {
     }
 }
 
-/// Evaluates light from emitters.
-fn emitted<'a>(gather: &'a Gather<'a>) -> impl Fn(&[SampleQuery]) -> Vec<Rgb> + Sync + 'a {
-    |queries: &[SampleQuery]| {
-        let Some(first) = queries.first() else { return Vec::new() };
-        let leaf = gather.over_emitters(first.element);
-        queries.iter().map(|query| leaf.emitted(query.position, query.inward)).collect()
+impl EmittedLight {
+    /// Evaluates what is not known yet, each leaf's points together.
+    fn find<'a>(&mut self, gather: &Gather<'_>, queries: impl Iterator<Item = &'a SampleQuery>) {
+        let mut unknown: Vec<&SampleQuery> = queries.filter(|query| !self.0.contains_key(&query.key())).collect();
+        unknown.sort_by_key(|query| query.element);
+        let groups: Vec<&[&SampleQuery]> = unknown.chunk_by(|a, b| a.element == b.element).collect();
+        let found: Vec<Vec<Rgb>> = groups
+            .par_iter()
+            .map(|group| {
+                let leaf = gather.over_emitters(group[0].element);
+                group.iter().map(|query| leaf.emitted(query.position, query.inward)).collect()
+            })
+            .collect();
+        self.0.extend(unknown.iter().map(|query| query.key()).zip(found.into_iter().flatten()));
+    }
+
+    fn at(&self, queries: &[SampleQuery]) -> Vec<Rgb> {
+        queries.par_iter().map(|query| self.0[&query.key()]).collect()
     }
 }
 

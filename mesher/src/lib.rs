@@ -31,5 +31,5 @@ pub use discontinuity::{Discontinuity, discontinuities};
 pub use edge_table::{EdgeTable, Leaf, LeafSegment, edge_table};
 pub use leaf_mesh::{Mesh, MeshStatistics, MeshTriangle, leaf_meshes};
 pub use ranking::{RankedLine, rank};
-pub use samples::{Evaluate, Progress, SampleQuery, SampleTable, evaluate_samples, sample_table};
+pub use samples::{Progress, SampleQuery, SampleTable, sample_table};
 pub use weight::{Sweep, Weight};

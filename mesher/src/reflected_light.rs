@@ -14,11 +14,12 @@ use std::collections::HashMap;
 use glam::{DVec2, DVec3, Vec3};
 use rayon::prelude::*;
 use scene::{Interpolant, Rgb, Scene};
-use solver::{ElementLight, Gather, NodeId, SeenNode, Solution};
+use solver::{ElementLight, Gather, NodeId, SeenNode, Solution, Visibility};
 
 use crate::fine_mesh::FineMesh;
 use crate::probe::{at, colour_mean, probe_point};
 use crate::projection::Projection;
+use crate::samples::QueryKey;
 use crate::{Leaf, Mesh, SampleQuery, SampleTable, edge_table, leaf_meshes, sample_table};
 
 /// Light over reflectors on all surfaces.
@@ -26,14 +27,13 @@ pub(crate) struct ReflectedLight {
     /// The leaves of the coarse mesh, elements of the solution.
     front: Vec<NodeId>,
     /// What a sample sees, by what it is asked: kept from mesh to mesh.
-    rows: HashMap<Station, Row>,
+    rows: HashMap<QueryKey, Row>,
+    /// The source error that the rows were found with.
+    source_error: f64,
     coarse: CoarseMesh,
     /// What is reflected, at each sample of the fine mesh: the irradiance one bounce earlier.
     pub reflecting: Vec<Rgb>,
 }
-
-/// Position and direction of approach of a sample, to the bit, on a polygon.
-type Station = (u32, [u64; 6]);
 
 /// What a sample sees of the reflectors.
 type Row = Vec<Seen>;
@@ -83,7 +83,7 @@ impl ReflectedLight {
                 open.extend(elements.children(node).rev());
             }
         }
-        Self { front, rows: HashMap::new(), coarse: CoarseMesh::default(), reflecting: Vec::new() }
+        Self { front, rows: HashMap::new(), source_error: 0.0, coarse: CoarseMesh::default(), reflecting: Vec::new() }
     }
 
     /// Finds the light: meshes the front, finds what new samples see, and sends light to and fro.
@@ -94,12 +94,13 @@ impl ReflectedLight {
             self.solve_roughly(scene, solution, fine, &projection, options);
         }
         self.coarse = CoarseMesh::new(scene, solution, &self.front);
+        let small = SMALL_PATCH * scene.size();
         let queries: Vec<[SampleQuery; 2]> =
-            self.coarse.table.queries.iter().map(|query| stand_ins(solution, query)).collect();
+            self.coarse.table.queries.iter().map(|query| stand_ins(solution, query, small)).collect();
         self.look(scene, solution, queries.as_flattened(), options, STALE);
         let places = self.places(solution, fine);
         let rows: Vec<[&Row; 2]> =
-            queries.iter().map(|pair| pair.each_ref().map(|query| &self.rows[&station(query)])).collect();
+            queries.iter().map(|pair| pair.each_ref().map(|query| &self.rows[&query.key()])).collect();
         let receive = |solution: &Solution| received_between(&Radiosity::of(scene, solution), &rows);
         // From darkness, so that what is dark stays exactly dark; later on from the light that is known, where all bounces count.
         let mut values =
@@ -144,7 +145,7 @@ impl ReflectedLight {
         self.reflecting = light(solution, &correction);
         solution.set_light(projection.planes(&self.reflecting));
         self.look(scene, solution, &probes, options, STALE);
-        let rows: Vec<&Row> = probes.iter().map(|query| &self.rows[&station(query)]).collect();
+        let rows: Vec<&Row> = probes.iter().map(|query| &self.rows[&query.key()]).collect();
         for _ in 0..ROUGH_ITERATIONS {
             let values = Radiosity::of(scene, solution).received(&rows);
             for ((correction, value), query) in correction.iter_mut().zip(values).zip(&probes) {
@@ -164,13 +165,17 @@ impl ReflectedLight {
     pub fn leaf_errors(&mut self, scene: &Scene, solution: &Solution, options: &Exchange) -> Vec<LeafError> {
         let queries: Vec<SampleQuery> = self.front.iter().map(|&leaf| probe(solution, leaf)).collect();
         self.look(scene, solution, &queries, options, STALE_PROBE);
-        let rows: Vec<&Row> = queries.iter().map(|query| &self.rows[&station(query)]).collect();
+        let rows: Vec<&Row> = queries.iter().map(|query| &self.rows[&query.key()]).collect();
         let exact = Radiosity::of(scene, solution).received(&rows);
+        // The probe scatters, and so do the samples about it: what they differ by for that no division mends.
+        let scatter = 2.0
+            * BEYOND_CHANCE.powi(2)
+            * Gather::with_source_error(scene, solution, options.source_error).scatter().powi(2);
         let error = |(leaf, (query, exact)): (usize, (&SampleQuery, Rgb))| {
             let difference = self.coarse.place(leaf, query).map_or(Rgb::ZERO, |place| self.coarse.at(place)) - exact;
             LeafError {
                 element: query.element,
-                error: colour_mean(difference * difference).sqrt(),
+                error: (colour_mean(difference * difference) - scatter * colour_mean(exact).powi(2)).max(0.0).sqrt(),
                 irradiance: colour_mean(exact),
             }
         };
@@ -196,13 +201,19 @@ impl ReflectedLight {
     /// Finds out what queries see that are not known yet, or were looked at when reflectors were coarser.
     fn look(&mut self, scene: &Scene, solution: &Solution, queries: &[SampleQuery], options: &Exchange, stale: f64) {
         let gather = Gather::with_source_error(scene, solution, options.source_error);
+        // Rays are told by the source error how many they are, and by nothing else.
+        if solution.visibility == Visibility::Rays && self.source_error != options.source_error {
+            self.rows.clear();
+            self.source_error = options.source_error;
+        }
+        let stale = if solution.visibility == Visibility::Rays { f64::INFINITY } else { stale };
         let allowed = stale * gather.budget();
         let unknown: Vec<&SampleQuery> = queries
             .iter()
-            .filter(|query| self.rows.get(&station(query)).is_none_or(|row| is_stale(&gather, row, allowed)))
+            .filter(|query| self.rows.get(&query.key()).is_none_or(|row| is_stale(&gather, row, allowed)))
             .collect();
         let mut unknown = unknown;
-        unknown.dedup_by_key(|query| station(query));
+        unknown.dedup_by_key(|query| query.key());
         let groups: Vec<&[&SampleQuery]> = unknown.chunk_by(|a, b| a.element == b.element).collect();
         let found: Vec<Vec<Row>> = groups
             .par_iter()
@@ -217,7 +228,7 @@ impl ReflectedLight {
                 group.iter().map(row).collect()
             })
             .collect();
-        self.rows.extend(unknown.iter().map(|query| station(query)).zip(found.into_iter().flatten()));
+        self.rows.extend(unknown.iter().map(|query| query.key()).zip(found.into_iter().flatten()));
     }
 
     /// Where the samples of a fine mesh lie on the coarse one; nowhere if that has no triangles there.
@@ -256,6 +267,10 @@ pub(crate) struct Exchange {
 /// nodes. Less finds most rows wanting after every division.
 const STALE: f64 = 3.0;
 
+/// Standard deviations of what rays scatter by beyond which a difference is an error. Less divides leaves for nothing, again
+/// and again.
+const BEYOND_CHANCE: f64 = 2.5;
+
 /// The same for probes, which only tell errors.
 const STALE_PROBE: f64 = 10.0;
 
@@ -278,12 +293,6 @@ impl From<&SeenNode> for Seen {
     fn from(seen: &SeenNode) -> Self {
         Self { node: seen.node, form_factor: seen.form_factor as f32, offset: seen.offset.as_vec2().to_array() }
     }
-}
-
-fn station(query: &SampleQuery) -> Station {
-    let [x, y, z] = query.position.to_array().map(f64::to_bits);
-    let [u, v, w] = query.inward.to_array().map(f64::to_bits);
-    (query.polygon, [x, y, z, u, v, w])
 }
 
 /// Whether a row refers to nodes that have been divided since and whose light has turned out not to be linear, so that it
@@ -323,6 +332,10 @@ fn received_between(radiosity: &Radiosity, rows: &[[&Row; 2]]) -> Vec<Rgb> {
     values.chunks(2).map(|pair| (2.0 * pair[0] - pair[1]).max(Rgb::ZERO)).collect()
 }
 
+/// Length of patches, as a fraction of the scene's size, below which light over reflectors is taken for the same all over
+/// them until a probe says otherwise. Larger leaves more to probes.
+const SMALL_PATCH: f64 = 0.02;
+
 /// How far from a contact its stand-ins lie, as parts of the way to the middle of the element. Nearer ones feel more of what
 /// is special to the contact, farther ones miss more of what curves.
 const ASIDE: f64 = 0.07;
@@ -332,7 +345,16 @@ const ASIDE: f64 = 0.07;
 /// At a contact the slope of the light over reflectors is infinite (it goes with d ln d at the distance d), and an interpolant
 /// through the limit is off over all of the leaf. One through what the light is a little aside, continued in a straight line,
 /// is off in a strip.
-fn stand_ins(solution: &Solution, query: &SampleQuery) -> [SampleQuery; 2] {
+///
+/// A patch of a scene of many that is shorter than `small`, metres, and has not been divided is looked at once, in its middle.
+fn stand_ins(solution: &Solution, query: &SampleQuery, small: f64) -> [SampleQuery; 2] {
+    let elements = &solution.elements;
+    let is_whole =
+        elements.patch_of(query.element).is_some_and(|patch| elements.patches[patch as usize].root == query.element);
+    if solution.visibility == Visibility::Rays && is_whole && elements.cell_length(query.element) < small {
+        let position = elements.nodes[query.element as usize].centre;
+        return [SampleQuery { position, inward: DVec3::ZERO, ..*query }; 2];
+    }
     if query.inward == DVec3::ZERO {
         return [*query; 2];
     }

@@ -14,7 +14,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use rayon::prelude::*;
 use scene::{Bvh, Interpolant, Ray, Rgb, Scene, other_sides};
-use solver::{Gather, NodeId, SeenNode, Solution};
+use solver::{Gather, NodeId, SeenNode, Solution, Visibility};
 
 use crate::fine_mesh::FineMesh;
 use crate::probe::{at, colour_mean};
@@ -25,6 +25,10 @@ const POINTS: usize = 1024;
 /// What each half may scatter by at a point, as a part of the tolerance; and the rays that it takes at least and at most.
 const SCATTER: f64 = 1.0;
 const RAYS: [f64; 2] = [4.0, 4096.0];
+
+/// The source error whose rays measure a scene without links, as a part of the tolerance: what each half scatters by is then
+/// about what the bake may be off by.
+const TURNED_ERROR: f64 = 0.12;
 
 /// How far the light of a reflector may stray from a plane over the nodes that points see, as a fraction of the scene's mean
 /// irradiance. More leaves more to rays, less more to form factors. The nodes are the same for all that a point sees of a
@@ -51,6 +55,9 @@ pub(crate) fn residual(
     reflecting: &[Rgb],
     tolerance: f64,
 ) -> Vec<ResidualPoint> {
+    if solution.visibility == Visibility::Rays {
+        return residual_by_rays(scene, solution, fine, samples, tolerance);
+    }
     let gather = Gather::with_even_nodes(scene, solution, STRAYS);
     let bvh = Bvh::of_triangles((0..fine.triangles()).map(|triangle| fine.corners(triangle)).collect());
     let mean = colour_mean(solution.mean_irradiance);
@@ -107,6 +114,34 @@ pub(crate) fn residual(
                 known + sum / f64::from(rays.max(1))
             });
             let baked = value(samples, triangle, s, t);
+            ResidualPoint {
+                differences: halves.map(|half| baked - half),
+                irradiance: colour_mean((halves[0] + halves[1]) / 2.0),
+                triangle: triangle as u32,
+            }
+        })
+        .collect()
+}
+
+/// The same in a scene whose reflected light is found by rays: each half looks anew, with rays of its own, at what the leaf
+/// elements reflect. It sees the error of interpolants, of the nodes that stood for leaves, and of the bake's own rays.
+fn residual_by_rays(
+    scene: &Scene,
+    solution: &Solution,
+    fine: &FineMesh,
+    samples: &[Rgb],
+    tolerance: f64,
+) -> Vec<ResidualPoint> {
+    let halves = [1, 2].map(|turn| Gather::with_turned_rays(scene, solution, TURNED_ERROR * tolerance, turn));
+    points(fine)
+        .into_par_iter()
+        .map(|(triangle, s, t)| {
+            let leaf = &fine.leaves[fine.mesh.triangles[triangle].leaf as usize];
+            let position = at(fine.corners(triangle), (s, t));
+            let emitted = halves[0].over_emitters(leaf.element).emitted(position, DVec3::ZERO);
+            let halves = halves.each_ref().map(|half| emitted + half.reflected_by_rays(leaf.polygon, position));
+            let baked = Interpolant::through(fine.table.triangles[triangle].map(|sample| samples[sample as usize]))
+                .evaluate(s, t);
             ResidualPoint {
                 differences: halves.map(|half| baked - half),
                 irradiance: colour_mean((halves[0] + halves[1]) / 2.0),

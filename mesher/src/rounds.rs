@@ -3,9 +3,10 @@
 
 use glam::{DVec2, Vec3};
 use scene::{Rgb, Scene};
-use solver::{NodeId, Solution};
+use solver::{NodeId, Solution, Visibility};
 
-use crate::fine_mesh::FineMesh;
+use crate::claimed_error::LARGEST_REFLECTANCE;
+use crate::fine_mesh::{EmittedLight, FineMesh};
 use crate::probe::colour_mean;
 use crate::refinement::worst;
 use crate::reflected_light::{Exchange, ReflectedLight};
@@ -17,6 +18,9 @@ const AIM: f64 = 0.6;
 /// Meshes in one round at most. Each divides what the last one found wanting.
 const MESHES: u32 = 12;
 
+/// The same where reflected light is found by rays: what is left after some is chance.
+const MESHES_BY_RAYS: u32 = 4;
+
 /// Leaves with a cell shorter than this fraction of the scene's size are not divided: at a corner of contact the error falls
 /// no faster than its area.
 const SMALLEST_LEAF: f64 = 1e-3;
@@ -25,12 +29,16 @@ const SMALLEST_LEAF: f64 = 1e-3;
 /// the last one's change, summed over the bounces to come.
 const RESIDUAL_SHARE: f64 = 0.02;
 
+/// An emitter that sends less than this part of the tolerance to a point is dim there.
+const DIM: f64 = 0.5;
+
 /// What goes from round to round.
 pub(crate) struct Rounds<'a> {
     pub scene: &'a Scene,
     pub options: &'a BakeOptions,
     pub solution: Solution,
     pub found: Vec<Vec<Discontinuity>>,
+    pub emitted: EmittedLight,
     pub reflected: ReflectedLight,
     /// Mean irradiance of all surfaces, averaged over the colours, W·m⁻².
     pub mean: f64,
@@ -51,12 +59,17 @@ impl Rounds<'_> {
         if !self.solution.reflects() {
             return fine;
         }
-        for _ in 0..MESHES {
+        let meshes = if self.solution.visibility == Visibility::Rays { MESHES_BY_RAYS } else { MESHES };
+        for last in (0..meshes).rev() {
             let exchange = Exchange {
                 source_error: self.source_share * self.options.tolerance,
                 residual: RESIDUAL_SHARE * self.options.tolerance * self.mean * (1.0 - self.reflectance),
             };
             self.reflected.solve(self.scene, &mut self.solution, &fine, &exchange);
+            if self.solution.visibility == Visibility::Rays {
+                let samples = self.reflected.irradiance(&self.solution, &fine);
+                self.take_means(&fine, &samples);
+            }
             let errors = self.reflected.leaf_errors(self.scene, &self.solution, &exchange);
             self.reflected_errors = errors.iter().map(|error| (error.element, error.error)).collect();
             self.reflected_errors.sort_unstable_by_key(|error| error.0);
@@ -68,7 +81,7 @@ impl Rounds<'_> {
                 })
                 .collect();
             let divided = self.wanting(&leaves);
-            if divided.is_empty() || fine.triangles() > self.options.max_triangles {
+            if divided.is_empty() || last == 0 || fine.triangles() > self.options.max_triangles {
                 break;
             }
             if self.reflected.divide(&mut self.solution, &divided) {
@@ -79,9 +92,10 @@ impl Rounds<'_> {
     }
 
     /// The mesh of the solution's leaves as they are.
-    fn fine_mesh(&self) -> FineMesh {
+    fn fine_mesh(&mut self) -> FineMesh {
         let BakeOptions { discontinuities, weight, .. } = *self.options;
-        FineMesh::new(self.scene, &self.solution, &self.found, weight, discontinuities as usize)
+        let lines = (weight, discontinuities as usize);
+        FineMesh::new(self.scene, &self.solution, &self.found, lines, DIM * self.options.tolerance, &mut self.emitted)
     }
 
     /// Irradiance at the samples of a mesh, W·m⁻².
@@ -89,12 +103,39 @@ impl Rounds<'_> {
         if self.solution.reflects() { self.reflected.irradiance(&self.solution, fine) } else { fine.emitted.clone() }
     }
 
+    /// What a scene without links is told of its light as a whole by a mesh of it.
+    fn take_means(&mut self, fine: &FineMesh, samples: &[Rgb]) {
+        let (mut arrives, mut reflected, mut area) = (Rgb::ZERO, Rgb::ZERO, 0.0);
+        for (triangle, stations) in fine.table.triangles.iter().enumerate() {
+            // A quadratic's mean is that of its midpoints.
+            let mean = [1, 3, 5].map(|i: usize| samples[stations[i] as usize]).iter().sum::<Rgb>() / 3.0;
+            let part = scene::area_vector(&fine.corners(triangle)).length();
+            let polygon = fine.leaves[fine.mesh.triangles[triangle].leaf as usize].polygon;
+            arrives += mean * part;
+            reflected += mean * part * self.scene.material(polygon).reflectance;
+            area += part;
+        }
+        let (arrives, area) = (arrives.max(Rgb::ZERO), f64::max(area, f64::MIN_POSITIVE));
+        self.solution.mean_irradiance = arrives / area;
+        self.mean = colour_mean(arrives / area);
+        if self.solution.reflects() && self.mean > 0.0 {
+            self.reflectance = (colour_mean(reflected) / colour_mean(arrives)).clamp(0.0, LARGEST_REFLECTANCE);
+        }
+    }
+
     /// Divides leaves until light from emitters is interpolated well enough.
     fn mesh_emitted(&mut self) -> FineMesh {
         let mut fine = self.fine_mesh();
+        if self.solution.visibility == Visibility::Rays && self.mean == 0.0 {
+            self.take_means(&fine, &fine.emitted);
+            // Nothing is known of reflected light yet but that there is as much as a closed room has.
+            let bounces = if self.solution.reflects() { 1.0 / (1.0 - self.reflectance) } else { 1.0 };
+            self.mean *= bounces;
+            self.solution.mean_irradiance *= bounces;
+        }
         for _ in 0..MESHES {
             let mut leaves: Vec<(NodeId, f64)> = fine.leaves.iter().map(|leaf| (leaf.element, 0.0)).collect();
-            for (triangle, (error, emitted)) in fine.probe_emitted(self.scene, &self.solution).into_iter().enumerate() {
+            for (triangle, (error, emitted)) in fine.probe_emitted().into_iter().enumerate() {
                 let leaf = fine.mesh.triangles[triangle].leaf as usize;
                 let element = leaves[leaf].0;
                 let own = emitted + colour_mean(self.solution.reflected_over_links(element, DVec2::ZERO));
@@ -122,7 +163,7 @@ impl Rounds<'_> {
             let of = |node: NodeId| self.reflected_errors.binary_search_by_key(&node, |error| error.0).ok();
             elements.ancestors(element).find_map(of).map_or(0.0, |place| self.reflected_errors[place].1)
         };
-        let errors = fine.probe_emitted(self.scene, &self.solution).into_iter().enumerate();
+        let errors = fine.probe_emitted().into_iter().enumerate();
         errors
             .map(|(triangle, (emitted, _))| {
                 let leaf = &fine.leaves[fine.mesh.triangles[triangle].leaf as usize];

@@ -5,11 +5,10 @@
 //! contact, or one for each direction at a corner; there triangles share what is theirs to share.
 
 use std::collections::HashMap;
-use std::sync::atomic::{AtomicUsize, Ordering};
 
 use glam::DVec3;
 use rayon::prelude::*;
-use scene::{Rgb, Scene};
+use scene::Scene;
 use solver::Contact;
 
 use crate::{Leaf, Mesh};
@@ -28,8 +27,16 @@ pub struct SampleQuery {
     pub inward: DVec3,
 }
 
-/// Irradiance (W·m⁻²) for queries that all name the same element, one value each.
-pub type Evaluate<'a> = &'a (dyn Fn(&[SampleQuery]) -> Vec<Rgb> + Sync);
+/// Position and direction of approach of a query, to the bit, on its polygon: what its answer depends on.
+pub(crate) type QueryKey = (u32, [u64; 6]);
+
+impl SampleQuery {
+    pub(crate) fn key(&self) -> QueryKey {
+        let [x, y, z] = self.position.to_array().map(f64::to_bits);
+        let [u, v, w] = self.inward.to_array().map(f64::to_bits);
+        (self.polygon, [x, y, z, u, v, w])
+    }
+}
 
 /// Is told the fraction that is done, 0..=1; from any thread, but never a smaller one than the last in a thread.
 pub type Progress<'a> = &'a (dyn Fn(f64) + Sync);
@@ -116,30 +123,12 @@ fn stations([a, b, c]: [u32; 3]) -> [Station; 6] {
     [[a, a], middle(a, b), [b, b], middle(b, c), [c, c], middle(c, a)]
 }
 
-/// Evaluates queries in parallel, those of one element together, each once.
-pub fn evaluate_samples(queries: &[SampleQuery], evaluate: Evaluate<'_>, progress: Progress<'_>) -> Vec<Rgb> {
-    let groups: Vec<&[SampleQuery]> = queries.chunk_by(|a, b| a.element == b.element).collect();
-    let done = AtomicUsize::new(0);
-    let values: Vec<Vec<Rgb>> = groups
-        .par_iter()
-        .map(|group| {
-            let values = evaluate(group);
-            let before = done.fetch_add(group.len(), Ordering::Relaxed);
-            progress((before + group.len()) as f64 / queries.len() as f64);
-            values
-        })
-        .collect();
-    values.concat()
-}
-
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
 
-    use std::sync::Mutex;
-
     use proptest::prelude::*;
-    use scene::{Interpolant, SAMPLE_BARYCENTRICS};
+    use scene::{Interpolant, Rgb, SAMPLE_BARYCENTRICS};
 
     use super::*;
     use crate::testing::{Room, room, scene_of};
@@ -174,7 +163,6 @@ mod tests {
     fn no_triangles_have_no_samples() {
         let table = sample_table(&Scene::default(), &[], &Mesh::default(), &no_contact);
         assert_eq!(table, SampleTable::default());
-        assert_eq!(evaluate_samples(&[], &|_| unreachable!(), &|_| unreachable!()), []);
     }
 
     #[test]
@@ -218,19 +206,11 @@ mod tests {
             let mesh = leaf_meshes(&edge_table(&scene, &[], &leaves));
             let table = sample_table(&scene, &leaves, &mesh, &no_contact);
             let scale = scene.size();
-            let asked = Mutex::new(Vec::new());
-            let reported = Mutex::new(0.0f64);
-            let evaluate = |queries: &[SampleQuery]| {
-                asked.lock().unwrap().extend(queries.iter().map(|q| (q.polygon, (q.position / scale).to_array().map(f64::to_bits))));
-                assert!(queries.iter().all(|query| query.element == queries[0].element));
-                queries.iter().map(|query| quadratic(query.position / scale)).collect()
-            };
-            let report = |fraction: f64| { let mut last = reported.lock().unwrap(); *last = last.max(fraction); };
-            let values = evaluate_samples(&table.queries, &evaluate, &report);
-            prop_assert_eq!(*reported.lock().unwrap(), 1.0);
+            let asked = table.queries.iter().map(|query| (query.polygon, query.position.to_array().map(f64::to_bits)));
+            let mut asked: Vec<_> = asked.collect();
+            let values: Vec<Rgb> = table.queries.iter().map(|query| quadratic(query.position / scale)).collect();
 
             // One evaluation for every vertex and edge of each polygon, none at one place twice.
-            let mut asked = asked.into_inner().unwrap();
             asked.sort_unstable();
             let all = asked.len();
             asked.dedup();
@@ -254,8 +234,7 @@ mod tests {
                 pool.install(|| {
                     let mesh = leaf_meshes(&edge_table(&scene, &[], &leaves));
                     let table = sample_table(&scene, &leaves, &mesh, &no_contact);
-                    let evaluate = |queries: &[SampleQuery]| queries.iter().map(|query| quadratic(query.position)).collect();
-                    let values = evaluate_samples(&table.queries, &evaluate, &|_| ());
+                    let values: Vec<Rgb> = table.queries.iter().map(|query| quadratic(query.position)).collect();
                     (mesh, table, values)
                 })
             };

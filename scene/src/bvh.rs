@@ -21,8 +21,9 @@ const AGREEMENT: f64 = 0.9;
 /// A hierarchy over triangles.
 pub struct Bvh {
     bvh: Bvh2,
+    /// In the order of the hierarchy's leaves, so that those that are met together lie together.
     triangles: Vec<[DVec3; 3]>,
-    /// What the caller calls each triangle.
+    /// What the caller calls each triangle, in the same order.
     owners: Vec<u32>,
 }
 
@@ -76,6 +77,8 @@ impl Bvh {
         let padded: Vec<_> =
             triangles.iter().map(|triangle| Padded(triangle, largest * PADDING + f64::MIN_POSITIVE)).collect();
         let bvh = build_bvh2(&padded, BvhBuildParams::medium_build(), &mut Duration::default());
+        let order = || bvh.primitive_indices.iter().map(|&index| index as usize);
+        let (triangles, owners) = (order().map(|i| triangles[i]).collect(), order().map(|i| owners[i]).collect());
         Self { bvh, triangles, owners }
     }
 
@@ -89,11 +92,11 @@ impl Bvh {
     fn closest(&self, ray: &Ray, accept: impl Fn(u32, f64) -> bool) -> Option<Hit> {
         let mut best: Option<(f64, usize, f64, f64)> = None;
         self.bvh.ray_traverse(library_ray(ray, f32::INFINITY), &mut RayHit::none(), |_, slot| {
-            let index = self.bvh.primitive_indices[slot] as usize;
-            match intersect_triangle(ray, self.triangles[index]) {
-                Some((distance, s, t)) if accept(self.owners[index], distance) => {
-                    if best.is_none_or(|(d, i, ..)| distance < d || (distance == d && index < i)) {
-                        best = Some((distance, index, s, t));
+            match intersect_triangle(ray, self.triangles[slot]) {
+                Some((distance, s, t)) if accept(self.owners[slot], distance) => {
+                    let first = |other: usize| self.bvh.primitive_indices[slot] < self.bvh.primitive_indices[other];
+                    if best.is_none_or(|(d, other, ..)| distance < d || (distance == d && first(other))) {
+                        best = Some((distance, slot, s, t));
                     }
                     // Rounded up, so that boxes at the same distance are still visited.
                     (distance as f32) * (1.0 + 4.0 * f32::EPSILON)
@@ -101,9 +104,9 @@ impl Bvh {
                 _ => f32::INFINITY,
             }
         });
-        best.map(|(distance, index, s, t)| {
-            let [a, b, c] = self.triangles[index];
-            Hit { id: self.owners[index], distance, s, t, normal: (b - a).cross(c - a).normalize_or_zero() }
+        best.map(|(distance, slot, s, t)| {
+            let [a, b, c] = self.triangles[slot];
+            Hit { id: self.owners[slot], distance, s, t, normal: (b - a).cross(c - a).normalize_or_zero() }
         })
     }
 
@@ -115,8 +118,7 @@ impl Bvh {
     fn blocked(&self, from: DVec3, to: DVec3, accept: impl Fn(u32, f64) -> bool) -> bool {
         let ray = Ray { origin: from, direction: to - from };
         let hits = |slot: usize| {
-            let index = self.bvh.primitive_indices[slot] as usize;
-            intersect_triangle(&ray, self.triangles[index]).is_some_and(|(d, ..)| accept(self.owners[index], d))
+            intersect_triangle(&ray, self.triangles[slot]).is_some_and(|(d, ..)| accept(self.owners[slot], d))
         };
         let missed =
             self.bvh.ray_traverse_miss(library_ray(&ray, 1.0), |_, slot| if hits(slot) { 0.5 } else { f32::INFINITY });
@@ -138,31 +140,49 @@ impl Bvh {
     pub fn near_segment(&self, from: DVec3, to: DVec3, mut visit: impl FnMut(u32)) {
         let ray = Ray { origin: from, direction: to - from };
         self.bvh.ray_traverse_anyhit(library_ray(&ray, 1.0), |_, slot| {
-            visit(self.owners[self.bvh.primitive_indices[slot] as usize]);
+            visit(self.owners[slot]);
         });
+    }
+
+    /// Calls `visit` with the id of every triangle below the boxes that `enters` takes, given by their lower and upper
+    /// corners; in no particular order.
+    pub fn within(&self, enters: impl Fn(DVec3, DVec3) -> bool, mut visit: impl FnMut(u32)) {
+        let mut open: Vec<u32> = if self.triangles.is_empty() { Vec::new() } else { vec![0] };
+        while let Some(node) = open.pop() {
+            let node = &self.bvh.nodes[node as usize];
+            let bounds = node.aabb();
+            if !enters(bounds.min.as_dvec3(), bounds.max.as_dvec3()) {
+                continue;
+            }
+            if node.is_leaf() {
+                let slots = node.first_index as usize..(node.first_index + node.prim_count) as usize;
+                self.owners[slots].iter().for_each(|&owner| visit(owner));
+            } else {
+                open.extend([node.first_index, node.first_index + 1]);
+            }
+        }
     }
 
     /// The triangle nearest to a point, at most `reach` metres away, whose normal agrees with `normal`; the hit's
     /// distance is in metres. Of two at the same distance the one with the smaller index wins.
     pub fn nearest_surface(&self, point: DVec3, normal: DVec3, reach: f64) -> Option<Hit> {
         let axis = normal.normalize_or_zero();
-        let mut best: Option<(usize, Hit)> = None;
+        let mut best: Option<(u32, Hit)> = None;
         let around = Aabb::new((point - reach).as_vec3a(), (point + reach).as_vec3a());
         self.bvh.aabb_traverse(around, |bvh, node| {
             let node = &bvh.nodes[node as usize];
             let slots = node.first_index as usize..(node.first_index + node.prim_count) as usize;
-            for &index in &bvh.primitive_indices[slots] {
-                let index = index as usize;
-                let [a, b, c] = self.triangles[index];
+            for slot in slots {
+                let (index, [a, b, c]) = (bvh.primitive_indices[slot], self.triangles[slot]);
                 let normal = (b - a).cross(c - a).normalize_or_zero();
                 if normal.dot(axis) < AGREEMENT {
                     continue;
                 }
                 let (s, t) = nearest_barycentrics([a, b, c], point);
                 let distance = (a * (1.0 - s - t) + b * s + c * t).distance(point);
-                let nearer = |(other, hit): &(usize, Hit)| (distance, index) < (hit.distance, *other);
+                let nearer = |(other, hit): &(u32, Hit)| (distance, index) < (hit.distance, *other);
                 if distance <= reach && best.as_ref().is_none_or(nearer) {
-                    best = Some((index, Hit { id: self.owners[index], distance, s, t, normal }));
+                    best = Some((index, Hit { id: self.owners[slot], distance, s, t, normal }));
                 }
             }
             true

@@ -56,6 +56,11 @@ impl Viewpoint {
 }
 
 impl BlockerCone {
+    /// Unit directions of the corners, in order.
+    pub fn corners(&self) -> &[DVec3] {
+        &self.corners
+    }
+
     /// What a polygon with unit normal `normal` hides from a point; none where it is seen edge-on.
     pub fn of_polygon(outline: &[DVec3], normal: DVec3, from: &Viewpoint, tolerance: f64) -> Option<Self> {
         let depth = normal.dot(from.position - outline.first()?);

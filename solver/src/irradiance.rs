@@ -8,6 +8,7 @@
 //! What we do differently: blockers in contact with the point enter by their limit ([`Viewpoint::tangent_cone`]).
 
 use std::cell::OnceCell;
+use std::sync::OnceLock;
 
 use glam::DVec3;
 use scene::{Rgb, Scene, luminance};
@@ -15,13 +16,19 @@ use scene::{Rgb, Scene, luminance};
 use crate::clip::{Position, locate};
 use crate::geometry::Geometry;
 use crate::leaf_gather::{LeafGather, SeenNode, Source};
+use crate::polygon_tree::PolygonTree;
+use crate::ray_gather::{RayGather, rays_for};
 use crate::solid::Solids;
-use crate::solution::Solution;
+use crate::solution::{Solution, Visibility};
+use crate::visibility::{Shaft, facing_parts};
 use crate::{LinkSource, NodeId};
 
 /// How much light one reflector may misplace at a point, as a fraction of the scene's mean irradiance, where nothing else is
 /// asked for. Smaller opens more elements at every point, and takes fewer reflectors for dim.
 const SOURCE_ERROR: f64 = 1e-3;
+
+/// What nodes may misplace where a bake is checked by other rays, as a part of what they may in the bake.
+const SMALLER: f64 = 0.25;
 
 /// How other polygons touch a point of a polygon: how many values irradiance has there.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -43,6 +50,12 @@ pub struct Gather<'a> {
     pub(crate) solution: &'a Solution,
     pub(crate) geometry: Geometry,
     pub(crate) solids: Solids,
+    pub(crate) tree: PolygonTree,
+    emitters: Vec<Emitter>,
+    /// Prepared when a point asks for reflectors first, in a scene where rays find them.
+    rays: OnceLock<RayGather>,
+    /// Rays from a point, and their turn.
+    sampling: (u32, u32),
     opening: Opening,
     /// Mean luminance of the radiosity that each polygon reflects, W·m⁻².
     radiosity: Vec<f64>,
@@ -55,6 +68,14 @@ enum Opening {
     ByIrradiance(f64),
     /// Those whose radiosity strays from their plane by more than this, whoever asks.
     ByRadiosity(f64),
+}
+
+/// A source of emitted light in a scene without links.
+#[derive(Clone, Copy)]
+struct Emitter {
+    polygon: u32,
+    /// The convex solid whose faces all emit the same, and which the polygon stands for.
+    solid: Option<u32>,
 }
 
 /// What a gather needs to know of a link.
@@ -78,16 +99,23 @@ impl<'a> Gather<'a> {
     /// irradiance.
     pub fn with_source_error(scene: &'a Scene, solution: &'a Solution, source_error: f64) -> Self {
         let budget = source_error * luminance(solution.mean_irradiance);
-        Self::with(scene, solution, Opening::ByIrradiance(budget))
+        Self::with(scene, solution, Opening::ByIrradiance(budget), (rays_for(source_error), 0))
+    }
+
+    /// The same with rays that have nothing in common with those of another `turn`, and with smaller nodes.
+    pub fn with_turned_rays(scene: &'a Scene, solution: &'a Solution, source_error: f64, turn: u32) -> Self {
+        let budget = SMALLER * source_error * luminance(solution.mean_irradiance);
+        Self::with(scene, solution, Opening::ByIrradiance(budget), (rays_for(source_error), turn))
     }
 
     /// The same with the same nodes of a reflector for every point that asks: those over which its radiosity strays from a
     /// plane by no more than a fraction of the scene's mean irradiance. Nothing is too dim to be looked at exactly.
     pub fn with_even_nodes(scene: &'a Scene, solution: &'a Solution, strays: f64) -> Self {
-        Self::with(scene, solution, Opening::ByRadiosity(strays * luminance(solution.mean_irradiance)))
+        let opening = Opening::ByRadiosity(strays * luminance(solution.mean_irradiance));
+        Self::with(scene, solution, opening, (rays_for(SOURCE_ERROR), 0))
     }
 
-    fn with(scene: &'a Scene, solution: &'a Solution, opening: Opening) -> Self {
+    fn with(scene: &'a Scene, solution: &'a Solution, opening: Opening, sampling: (u32, u32)) -> Self {
         let radiosity = |polygon| {
             let area = |root: NodeId| solution.elements.nodes[root as usize].area;
             let power = |root: NodeId| luminance(solution.light[root as usize].irradiance) * area(root);
@@ -97,19 +125,31 @@ impl<'a> Gather<'a> {
         let radiosity = scene.polygon_ids().map(radiosity).collect();
         let geometry = Geometry::new(scene);
         let solids = Solids::new(scene, &geometry);
-        Self { scene, solution, geometry, solids, opening, radiosity }
+        let emitters = emitters(scene, &solids);
+        let tree = PolygonTree::new(scene);
+        Self { scene, solution, geometry, solids, tree, emitters, rays: OnceLock::new(), sampling, opening, radiosity }
+    }
+
+    /// Rays over the solution's elements, where they stand in for links.
+    pub(crate) fn rays(&self) -> Option<&RayGather> {
+        let by_rays = self.solution.visibility == Visibility::Rays && self.solution.reflects();
+        by_rays.then(|| {
+            let (rays, turn) = self.sampling;
+            self.rays.get_or_init(|| RayGather::new(self.scene, self.solution, rays, self.budget(), turn))
+        })
     }
 
     /// How other polygons touch a point of a polygon, on its front.
     pub fn contact(&self, polygon: u32, position: DVec3) -> Contact {
         let up = self.geometry.plane(polygon).normal;
         let mut line: Option<DVec3> = None;
-        for (other, plane) in self.geometry.planes.iter().enumerate() {
+        for other in self.tree.near(position, self.geometry.contact_tolerance) {
+            let plane = self.geometry.plane(other);
             let across = up.cross(plane.normal);
             if plane.distance(position).abs() > self.geometry.contact_tolerance || across.length_squared() < 1e-18 {
                 continue;
             }
-            let outline = &self.geometry.outlines[other];
+            let outline = self.geometry.outline(other);
             let direction = match locate(outline, plane.normal, position, self.geometry.contact_tolerance) {
                 Position::Outside => continue,
                 Position::Interior => across.normalize(),
@@ -160,9 +200,17 @@ impl<'a> Gather<'a> {
     /// it: as far as is known, nothing for a leaf.
     pub fn misplaced(&self, node: NodeId, form_factor: f64) -> f64 {
         let solution = self.solution;
+        if let Some(rays) = self.rays() {
+            return rays.misplaced(solution, node);
+        }
         let polygon = solution.elements.polygon_of(node).unwrap_or_default();
         let reflectance = luminance(self.scene.material(polygon).reflectance);
         reflectance * solution.light[node as usize].deviation * form_factor
+    }
+
+    /// What the light over reflectors at a point scatters by, root mean square, relative to it: nothing but where rays find it.
+    pub fn scatter(&self) -> f64 {
+        self.rays().map_or(0.0, RayGather::scatter)
     }
 
     /// Irradiance, luminance, W·m⁻², that one reflector may misplace at a point; nothing where that is not what decides.
@@ -189,6 +237,9 @@ impl<'a> Gather<'a> {
     }
 
     fn over_sources(&'a self, element: NodeId, wanted: impl Fn(u32) -> bool) -> LeafGather<'a> {
+        if self.solution.visibility == Visibility::Rays {
+            return self.over_shafts(element);
+        }
         let (solution, elements) = (self.solution, &self.solution.elements);
         let area = elements.nodes[element as usize].area;
         let mut links: Vec<LinkSummary> = Vec::new();
@@ -231,7 +282,52 @@ impl<'a> Gather<'a> {
         }
         blockers.sort_unstable();
         blockers.dedup();
-        LeafGather { gather: self, polygon: elements.polygon_of(element).unwrap_or_default(), sources, blockers }
+        let polygon = elements.polygon_of(element).unwrap_or_default();
+        LeafGather { gather: self, polygon, centre: elements.nodes[element as usize].centre, sources, blockers }
+    }
+
+    /// A gather whose sources are all emitters that an element faces, each with what stands in the shaft between the two.
+    fn over_shafts(&'a self, element: NodeId) -> LeafGather<'a> {
+        let elements = &self.solution.elements;
+        let polygon = elements.polygon_of(element).unwrap_or_default();
+        let (outline, plane) = (elements.outline(element), self.geometry.plane(polygon));
+        let tolerance = self.geometry.contact_tolerance;
+        let blockers = |emitter: &Emitter| match emitter.solid {
+            Some(solid) if self.solids.of_polygon(polygon) == Some(solid) => None,
+            Some(solid) => {
+                let body = self.solids.corners(self.scene, solid);
+                let above = body.iter().any(|&corner| plane.distance(corner) > tolerance);
+                let found = self.tree.in_shaft(&self.geometry, &Shaft::towards(outline, &body));
+                let is_other = |blocker: &u32| *blocker != polygon && self.solids.of_polygon(*blocker) != Some(solid);
+                found.filter(|_| above).map(|found| found.into_iter().filter(is_other).collect::<Vec<u32>>())
+            }
+            None => {
+                let source = self.geometry.outline(emitter.polygon);
+                let parts = facing_parts(outline, &plane, source, &self.geometry.plane(emitter.polygon), tolerance);
+                let found =
+                    self.tree.in_shaft(&self.geometry, &Shaft::between(&parts.as_ref()?[0], &parts.as_ref()?[1]));
+                let is_other = |blocker: &u32| *blocker != polygon && *blocker != emitter.polygon;
+                found.map(|found| found.into_iter().filter(is_other).collect())
+            }
+        };
+        let source = |emitter: &Emitter| {
+            let blockers = blockers(emitter)?;
+            let polygon = emitter.polygon;
+            Some(Source {
+                polygon,
+                solid: emitter.solid,
+                roots: Vec::new(),
+                part: None,
+                blockers,
+                before: OnceCell::new(),
+            })
+        };
+        let sources: Vec<Source> =
+            self.emitters.iter().filter(|emitter| emitter.polygon != polygon).filter_map(source).collect();
+        let mut blockers: Vec<u32> = sources.iter().flat_map(|source| source.blockers.iter().copied()).collect();
+        blockers.sort_unstable();
+        blockers.dedup();
+        LeafGather { gather: self, polygon, centre: elements.nodes[element as usize].centre, sources, blockers }
     }
 
     /// A source polygon by all links from it.
@@ -247,7 +343,7 @@ impl<'a> Gather<'a> {
             (root, if all > 0.0 { visible / all } else { 0.0 })
         };
         let roots = links.chunk_by(|a, b| a.patch == b.patch).map(root).collect();
-        Source { polygon: links[0].polygon, roots, part: None, blockers, before: OnceCell::new() }
+        Source { polygon: links[0].polygon, solid: None, roots, part: None, blockers, before: OnceCell::new() }
     }
 
     /// Irradiance at a position in the plane of a polygon, W·m⁻²; `inward` is the direction in the plane from whose
@@ -257,6 +353,15 @@ impl<'a> Gather<'a> {
             Some(leaf) => self.over(leaf).irradiance(position, inward),
             None => Rgb::ZERO,
         }
+    }
+
+    /// Irradiance over reflectors at a position of a polygon that nothing touches, W·m⁻², where rays find it; else none.
+    pub fn reflected_by_rays(&self, polygon: u32, position: DVec3) -> Rgb {
+        let mut seen = Vec::new();
+        if let Some(rays) = self.rays() {
+            rays.seen_nodes(self.solution, polygon, position, DVec3::ZERO, &mut seen);
+        }
+        self.irradiance_from(&seen)
     }
 
     /// Irradiance from the reflectors that a point sees, W·m⁻².
@@ -304,4 +409,20 @@ impl<'a> Gather<'a> {
         }
         None
     }
+}
+
+/// What emits in a scene: polygons, and convex solids that emit the same all over. From outside such a solid looks like its
+/// outline, so that a bulb of hundreds of triangles is one source.
+fn emitters(scene: &Scene, solids: &Solids) -> Vec<Emitter> {
+    let mut emitters: Vec<Emitter> = Vec::new();
+    for polygon in scene.emitters() {
+        let exitance = scene.material(polygon).exitance();
+        let is_even =
+            |solid: &u32| solids.faces(*solid).iter().all(|&face| scene.material(face).exitance() == exitance);
+        let solid = solids.of_polygon(polygon).filter(|&solid| solids.is_closed(solid)).filter(is_even);
+        if solid.is_none_or(|solid| solids.faces(solid).first() == Some(&polygon)) {
+            emitters.push(Emitter { polygon, solid });
+        }
+    }
+    emitters
 }

@@ -12,13 +12,14 @@ use std::cell::OnceCell;
 use std::collections::HashMap;
 
 use glam::{DVec2, DVec3};
-use scene::Rgb;
+use scene::{Plane, Rgb, luminance};
 
 use crate::backprojection::{BlockerCone, Fragments, SLIVER, Viewpoint};
 use crate::blocker::Blocker;
 use crate::clip::clip_convex;
 use crate::form_factor::{form_factor_at, point_form_factor};
-use crate::{Gather, NodeId};
+use crate::ray_gather::{shift, spread_over};
+use crate::{Gather, NodeId, Visibility};
 
 /// The part of a source's form factor from which on nothing is taken to hide it: above the rounding of its clipping.
 const WHOLE: f64 = 1.0 - 1e-9;
@@ -26,6 +27,18 @@ const WHOLE: f64 = 1.0 - 1e-9;
 /// The second derivative of what a point sees of a place, relative to it and in units of the distance, is a few at most, at
 /// all angles that matter. Less opens fewer nodes.
 const CURVATURE: f64 = 2.0;
+
+/// Obstacles before a source at most that are projected one by one, in a scene of too many polygons for links; past more,
+/// rays tell what is seen of it. Less leaves penumbrae to rays that exact ones would be had for.
+const MOST_OBSTACLES: usize = 24;
+
+/// Rays that tell what is seen of a source, of one that is dim at the point and of a bright one. To stop early where the first few agree would take what is mostly seen for seen
+/// wholly.
+const SHARE_RAYS: [u32; 2] = [4, 36];
+
+/// How far from a contact a point is taken to be before rays, along its direction of approach, as a fraction of the scene's
+/// size.
+const ASIDE: f64 = 1e-7;
 
 /// Six points that integrate a polynomial of degree 4 over a triangle: weights, and barycentrics of which the second counts
 /// twice (Dunavant, "High Degree Efficient Symmetrical Gaussian Quadrature Rules for the Triangle", 1985). A point a
@@ -39,6 +52,8 @@ const TRIANGLE_RULE: [(f64, [f64; 2]); 2] = [
 pub struct LeafGather<'a> {
     pub(crate) gather: &'a Gather<'a>,
     pub(crate) polygon: u32,
+    /// Centre of the element, metres.
+    pub(crate) centre: DVec3,
     pub(crate) sources: Vec<Source>,
     /// All blockers of all sources, ascending.
     pub(crate) blockers: Vec<u32>,
@@ -48,6 +63,8 @@ pub struct LeafGather<'a> {
 #[derive(Clone)]
 pub(crate) struct Source {
     pub polygon: u32,
+    /// The convex solid that it stands for, if it is one whose faces all emit the same.
+    pub solid: Option<u32>,
     /// Root nodes of the patches that it stands for, each with its visible fraction, 0..=1, as the links know it.
     pub roots: Vec<(NodeId, f64)>,
     /// The root, if it stands for one patch of several alone.
@@ -109,7 +126,13 @@ impl LeafGather<'_> {
     /// touch the position, the limit is taken from that side; elsewhere it has no influence.
     pub fn irradiance(&self, position: DVec3, inward: DVec3) -> Rgb {
         let mut seen = Vec::new();
-        let emitted = self.look(position, inward, Light::Both, &mut seen);
+        let emitted = match self.gather.rays() {
+            None => self.look(position, inward, Light::Both, &mut seen),
+            Some(_) => {
+                self.seen_nodes(position, inward, &mut seen);
+                self.emitted(position, inward)
+            }
+        };
         emitted + self.gather.irradiance_from(&seen)
     }
 
@@ -120,13 +143,18 @@ impl LeafGather<'_> {
 
     /// Appends the nodes of reflectors that a position sees. Nodes are opened as far as the light of the solution asks for.
     pub fn seen_nodes(&self, position: DVec3, inward: DVec3, seen: &mut Vec<SeenNode>) {
-        self.look(position, inward, Light::Reflected, seen);
+        match self.gather.rays() {
+            None => {
+                self.look(position, inward, Light::Reflected, seen);
+            }
+            Some(rays) => rays.seen_nodes(self.gather.solution, self.polygon, position, inward, seen),
+        }
     }
 
     /// What may hide a source: its blockers in front of it, gathered to solids where all of a solid is.
     fn before(&self, source: &Source) -> Vec<Obstacle> {
         let Gather { scene, geometry, solids, .. } = self.gather;
-        let plane = geometry.plane(source.polygon);
+        let plane = self.plane(source);
         let mut obstacles: Vec<Obstacle> = Vec::new();
         for &polygon in &source.blockers {
             let number = self.blockers.partition_point(|&other| other < polygon);
@@ -141,6 +169,71 @@ impl LeafGather<'_> {
             obstacles.push(Obstacle { solid: solid.filter(whole), faces: vec![(number, blocker)] });
         }
         obstacles
+    }
+
+    /// The plane that a source lies in, its front towards the element. For a solid it is the one through the middle: what is
+    /// beyond it hides nothing.
+    fn plane(&self, source: &Source) -> Plane {
+        let Gather { scene, geometry, solids, .. } = self.gather;
+        let Some(solid) = source.solid else { return geometry.plane(source.polygon) };
+        let corners = solids.corners(scene, solid);
+        let middle = corners.iter().sum::<DVec3>() / corners.len().max(1) as f64;
+        let normal = (self.centre - middle).normalize_or_zero();
+        Plane { normal, offset: normal.dot(middle) }
+    }
+
+    /// Irradiance of unit exitance from a solid, as far as it is seen.
+    fn solid_form_factor(
+        &self,
+        source: &Source,
+        solid: u32,
+        from: &Viewpoint,
+        cones: &mut Cones,
+        fragments: &mut Fragments,
+    ) -> f64 {
+        let Gather { scene, geometry, solids, .. } = self.gather;
+        let Some(cone) = solids.cone(scene, geometry, solid, from) else { return 0.0 };
+        fragments.start(cone.corners(), from.up);
+        let obstacles = source.before.get_or_init(|| self.before(source));
+        if obstacles.len() > MOST_OBSTACLES {
+            let unoccluded = fragments.measure(from.up);
+            let distance = solids.corners(scene, solid)[0].distance(from.position);
+            let outline: Vec<DVec3> = cone.corners().iter().map(|corner| from.position + corner * distance).collect();
+            let passes = |polygon: u32| solids.of_polygon(polygon) == Some(solid);
+            return unoccluded * self.seen_share(&outline, SHARE_RAYS[1], from, passes);
+        }
+        for obstacle in obstacles {
+            if fragments.is_empty() {
+                return 0.0;
+            }
+            self.subtract(obstacle, from, cones, fragments);
+        }
+        fragments.measure(from.up)
+    }
+
+    /// The share of what an outline sends to a point that arrives there, by rays to points spread evenly over it.
+    fn seen_share(&self, outline: &[DVec3], rays: u32, from: &Viewpoint, passes: impl Fn(u32) -> bool) -> f64 {
+        let gather = self.gather;
+        let origin = from.position + from.inward * (ASIDE * gather.geometry.size);
+        let normal = scene::area_vector(outline).normalize_or_zero();
+        let areas: Vec<f64> =
+            outline[1..].windows(2).map(|edge| (edge[0] - outline[0]).cross(edge[1] - outline[0]).length()).collect();
+        let total: f64 = areas.iter().sum();
+        let shift = shift(from.position, 0);
+        let (mut seen, mut all) = (0.0, 0.0);
+        for i in 0..rays {
+            let place = spread_over(outline, &areas, total, shift, i);
+            let way = place - origin;
+            let square = way.length_squared();
+            let weight = from.up.dot(way).max(0.0) * normal.dot(way).abs() / (square * square).max(f64::MIN_POSITIVE);
+            if weight > 0.0 {
+                all += weight;
+                if !gather.tree.is_blocked(self.polygon, origin, place, &passes) {
+                    seen += weight;
+                }
+            }
+        }
+        if all > 0.0 { seen / all } else { 0.0 }
     }
 
     /// Cuts away what an obstacle hides from a point. `cones` are those that the point has needed so far, by number.
@@ -186,6 +279,10 @@ impl LeafGather<'_> {
             if !emits && !reflects {
                 continue;
             }
+            if let Some(solid) = source.solid {
+                total += self.solid_form_factor(source, solid, &from, &mut cones, &mut fragments) * material.exitance();
+                continue;
+            }
             let outline = source.outline(gather);
             let plane = gather.geometry.planes[source.polygon as usize];
             let depth = plane.distance(position);
@@ -207,7 +304,18 @@ impl LeafGather<'_> {
             } else {
                 continue;
             }
-            for obstacle in source.before.get_or_init(|| self.before(source)) {
+            let obstacles = source.before.get_or_init(|| self.before(source));
+            if !obstacles.is_empty() && !touches && self.gather.solution.visibility == Visibility::Rays {
+                let unoccluded = fragments.measure(up);
+                let is_dim = luminance(unoccluded * material.exitance()) <= self.gather.budget();
+                if is_dim || obstacles.len() > MOST_OBSTACLES {
+                    let rays = if is_dim { SHARE_RAYS[0] } else { SHARE_RAYS[1] };
+                    let share = self.seen_share(outline, rays, &from, |polygon| polygon == source.polygon);
+                    total += share * unoccluded * material.exitance();
+                    continue;
+                }
+            }
+            for obstacle in obstacles {
                 if fragments.is_empty() {
                     break;
                 }

@@ -16,7 +16,9 @@ mod irradiance;
 mod leaf_gather;
 mod linear_fit;
 mod oracle;
+mod polygon_tree;
 mod quadrature;
+mod ray_gather;
 mod refine;
 mod solid;
 mod solution;
@@ -33,7 +35,7 @@ pub use form_factor::{exchange, form_factor, form_factor_at, point_form_factor};
 pub use irradiance::{Contact, Gather};
 pub use leaf_gather::{LeafGather, SeenNode};
 pub use solution::{
-    BlockerLists, Convergence, Cut, ElementLight, Interaction, Link, LinkSource, Solution, SolveOptions,
+    BlockerLists, Convergence, Cut, ElementLight, Interaction, Link, LinkSource, Solution, SolveOptions, Visibility,
 };
 pub use solve::solve;
 pub use validate::Validation;

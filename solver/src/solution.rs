@@ -17,6 +17,16 @@ pub struct SolveOptions {
     pub bounces: Option<u32>,
 }
 
+/// How points of a solution find what they see.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Visibility {
+    /// By links, which name the sources and what may hide them.
+    #[default]
+    Links,
+    /// Emitters by shafts and reflectors by rays through a hierarchy over all polygons, which are too many to be linked.
+    Rays,
+}
+
 /// Where the light of a link comes from. Parts of the sky will stand beside nodes here.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum LinkSource {
@@ -154,6 +164,8 @@ pub struct Solution {
     pub link_error: f64,
     /// Interreflections followed, none for all.
     pub bounces: Option<u32>,
+    /// How points find what they see.
+    pub visibility: Visibility,
 }
 
 impl Solution {

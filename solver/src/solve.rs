@@ -1,11 +1,12 @@
 //! The solve: cut → link → refine and transport in turns.
 
+use glam::DVec3;
 use scene::{Rgb, Scene, luminance};
 
 use crate::cut::{contact_lines, cut_polygon};
 use crate::refine::{Network, SourceLight};
 use crate::transport::{Transport, transport};
-use crate::{Elements, Solution, SolveOptions};
+use crate::{BlockerLists, Convergence, Cut, ElementLight, Elements, Solution, SolveOptions, Visibility};
 
 /// Link error as a fraction of the scene's mean irradiance where none is asked for. Half of it costs the
 /// office half as many elements again.
@@ -19,6 +20,10 @@ const LARGEST_CELL: f64 = 0.1;
 /// elements; later ones hardly change a link.
 const REFINEMENTS: u32 = 3;
 
+/// Polygons of a scene at most whose pairs are linked. Finding a pair's blockers among all others takes time with the cube of
+/// their number: a few seconds here.
+const MOST_LINKED: usize = 400;
+
 /// Solves diffuse global illumination for a scene. `progress` is told the fraction that is done, 0..=1.
 ///
 /// A scene without emitters solves to darkness.
@@ -29,6 +34,10 @@ pub fn solve(scene: &Scene, options: &SolveOptions, progress: &(dyn Fn(f64) + Sy
     let mut first_patch = vec![0];
     for pieces in &pieces {
         first_patch.push(first_patch.last().unwrap_or(&0) + pieces.len() as u32);
+    }
+    if scene.polygons.len() > MOST_LINKED {
+        progress(1.0);
+        return unlinked(scene, &pieces, cuts, first_patch, options);
     }
     let mut network = Network::of_patches(scene, Elements::new(&pieces), &first_patch, options.bounces == Some(0));
     progress(0.1);
@@ -68,6 +77,36 @@ pub fn solve(scene: &Scene, options: &SolveOptions, progress: &(dyn Fn(f64) + Sy
         convergence: carried.convergence,
         link_error,
         bounces: options.bounces,
+        visibility: Visibility::Links,
+    }
+}
+
+/// The elements of a scene that is too large to be linked, in darkness: its light is found point by point.
+fn unlinked(
+    scene: &Scene,
+    pieces: &[Vec<Vec<DVec3>>],
+    cuts: Vec<Vec<Cut>>,
+    first_patch: Vec<u32>,
+    options: &SolveOptions,
+) -> Solution {
+    let mut elements = Elements::new(pieces);
+    elements.divide_larger(scene.size() * LARGEST_CELL);
+    let dark = vec![ElementLight::default(); elements.nodes.len()];
+    Solution {
+        first_link: vec![0; elements.nodes.len() + 1],
+        elements,
+        cuts,
+        first_patch,
+        links: Vec::new(),
+        blockers: BlockerLists::default(),
+        irradiance: dark.clone(),
+        direct: dark.clone(),
+        light: dark,
+        mean_irradiance: Rgb::ZERO,
+        convergence: Convergence { reached: true, ..Convergence::default() },
+        link_error: 0.0,
+        bounces: options.bounces,
+        visibility: Visibility::Rays,
     }
 }
 
@@ -97,8 +136,6 @@ fn mean_irradiance(elements: &Elements, transport: &Transport) -> Rgb {
 
 #[cfg(test)]
 mod tests {
-    use glam::DVec3;
-
     use super::*;
     use crate::Gather;
     use crate::testing::Builder;

@@ -60,6 +60,31 @@ impl<'a> Shaft<'a> {
         shaft
     }
 
+    /// The shaft between an outline and the corners of any body in front of it. It has the sides through the outline's edges
+    /// alone, so that it is larger than the hull of both, never smaller.
+    pub fn towards(a: &'a [DVec3], body: &'a [DVec3]) -> Self {
+        let corners = || a.iter().chain(body).copied();
+        let (low, high) =
+            (corners().fold(DVec3::INFINITY, DVec3::min), corners().fold(DVec3::NEG_INFINITY, DVec3::max));
+        let tolerance = TOUCH * (high - low).length();
+        let mut shaft = Self { ends: [a, body], planes: Vec::with_capacity(a.len() + 1), low, high, tolerance };
+        shaft.planes.extend(Some(Plane::through(a)).filter(|front| front.normal != DVec3::ZERO));
+        for (i, &from) in a.iter().enumerate() {
+            shaft.add_side(from, a[(i + 1) % a.len()], body);
+        }
+        shaft
+    }
+
+    /// Whether a box, given by its lower and upper corner, may reach into the shaft: false is a proof.
+    pub fn may_enter(&self, low: DVec3, high: DVec3) -> bool {
+        (high - self.low).min_element() > self.tolerance
+            && (self.high - low).min_element() > self.tolerance
+            && self.planes.iter().all(|plane| {
+                let farthest = DVec3::select(plane.normal.cmpgt(DVec3::ZERO), high, low);
+                plane.distance(farthest) > self.tolerance
+            })
+    }
+
     /// Adds the side through an edge of one end that just holds the other end.
     fn add_side(&mut self, from: DVec3, to: DVec3, far: &[DVec3]) {
         let edge = to - from;

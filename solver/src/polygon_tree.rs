@@ -1,0 +1,59 @@
+//! Which polygons touch a point, stand in a shaft, or block a ray: a hierarchy over all of them, asked in place of each.
+
+use glam::DVec3;
+use scene::{Bvh, Scene, other_sides};
+
+use crate::geometry::Geometry;
+use crate::visibility::{Occlusion, Shaft};
+
+/// A bounding volume hierarchy over the polygons of a scene.
+pub struct PolygonTree {
+    bvh: Bvh,
+    /// By polygon, the one that is the other side of the same surface.
+    other_sides: Vec<Option<u32>>,
+}
+
+impl PolygonTree {
+    /// Looks a scene over once.
+    pub fn new(scene: &Scene) -> Self {
+        Self { bvh: Bvh::of_scene(scene), other_sides: other_sides(scene) }
+    }
+
+    /// Polygons whose padded boxes contain a point to within `reach` metres, ascending.
+    pub fn near(&self, point: DVec3, reach: f64) -> Vec<u32> {
+        self.ascending(|low, high| (point + reach).cmpge(low).all() && (point - reach).cmple(high).all())
+    }
+
+    /// Polygons that stand in a shaft, ascending; none if one of them fills it, so that nothing passes.
+    pub fn in_shaft(&self, geometry: &Geometry, shaft: &Shaft<'_>) -> Option<Vec<u32>> {
+        let mut found = self.ascending(|low, high| shaft.may_enter(low, high));
+        let mut total = false;
+        found.retain(|&polygon| match shaft.classify(geometry.outline(polygon)) {
+            Occlusion::Clear => false,
+            Occlusion::Partial => true,
+            Occlusion::Total => {
+                total = true;
+                true
+            }
+        });
+        (!total).then_some(found)
+    }
+
+    /// Whether a polygon stands between a point of a polygon and another point, apart from the polygon, its other side, and
+    /// those that `passes` lets through.
+    pub fn is_blocked(&self, polygon: u32, from: DVec3, to: DVec3, passes: impl Fn(u32) -> bool) -> bool {
+        self.bvh.is_blocked_among(from, to, |other| !self.is_own(polygon, other) && !passes(other))
+    }
+
+    fn is_own(&self, polygon: u32, other: u32) -> bool {
+        other == polygon || self.other_sides[polygon as usize] == Some(other)
+    }
+
+    fn ascending(&self, enters: impl Fn(DVec3, DVec3) -> bool) -> Vec<u32> {
+        let mut found = Vec::new();
+        self.bvh.within(enters, |polygon| found.push(polygon));
+        found.sort_unstable();
+        found.dedup();
+        found
+    }
+}

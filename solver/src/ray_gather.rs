@@ -1,0 +1,407 @@
+//! What a point sees of the reflectors, by rays: for scenes of too many polygons to look at each.
+//!
+//! Two kinds of rays share what there is to see. Patches that send most of a scene's light are looked at one by one: the form
+//! factor is exact, and rays to points spread over them tell how much of it is hidden, none of it in most cases. All else is
+//! met by rays spread evenly over the hemisphere, by the cosine. A ray that meets what is looked at one by one counts nothing:
+//! what is divided is the surfaces, so that nothing counts twice and nothing is lost. Nothing leaks: a ray stops where it
+//! should. What it costs grows with the logarithm of the number of polygons.
+
+use std::f64::consts::TAU;
+
+use glam::{DVec2, DVec3};
+use scene::{Bvh, Ray, Scene, luminance, other_sides};
+
+use crate::form_factor::form_factor_at;
+use crate::leaf_gather::SeenNode;
+use crate::{NodeId, Patch, Solution};
+
+/// The powers of the plastic number, whose multiples fill the square evenly (Roberts 2018).
+const STEP: [f64; 2] = [0.754_877_666_246_692_8, 0.569_840_290_998_053_3];
+
+/// Rays from a point for a source error of `RAYS_ERROR`. What rays that are spread evenly miss falls with their number to the
+/// power of −3/4.
+const RAYS: f64 = 256.0;
+const RAYS_ERROR: f64 = 0.0036;
+
+/// What a single ray would be off by, relative to the light over reflectors.
+const SCATTER: f64 = 0.6;
+
+/// Rays from a point at least and at most.
+const LEAST_RAYS: f64 = 64.0;
+const MOST_RAYS: f64 = 4096.0;
+
+/// How far from a contact a point is taken to be, along its direction of approach, as a fraction of the scene's size: above
+/// the rounding of rays, below anything that light tells apart.
+const ASIDE: f64 = 1e-7;
+
+/// Patches that are looked at one by one, at most, and the part of all reflected light that they send at most: more cost every
+/// point, fewer leave bright ones to chance.
+const MOST_PROMINENT: usize = 96;
+const PROMINENT_SHARE: f64 = 0.9;
+
+/// The place of a patch that is not among them.
+const NOT_PROMINENT: u16 = u16::MAX;
+
+/// A patch is looked at where it sends more than this part of the budget to a point.
+const NEGLIGIBLE: f64 = 2.0;
+
+/// Rays that tell what is hidden of a node, at least: of a dim one and of a bright one. A large node gets as many as would meet
+/// it of those over the hemisphere. To stop early where the first agree would take what is mostly seen for seen wholly.
+const AIMED_RAYS: [u32; 2] = [1, 2];
+
+/// Where rays start: a position just in front of all that touches it, on a polygon.
+struct Origin {
+    polygon: u32,
+    position: DVec3,
+    normal: DVec3,
+    /// Of the lattices that rays from here are spread by.
+    shift: DVec2,
+}
+
+/// Sends rays into a solved scene.
+pub(crate) struct RayGather {
+    bvh: Bvh,
+    /// Root nodes that are looked at one by one, and by patch the place among them.
+    prominent: Vec<NodeId>,
+    place_of: Vec<u16>,
+    /// By triangle of the hierarchy, the patch that it is a part of.
+    patches: Vec<u32>,
+    other_sides: Vec<Option<u32>>,
+    normals: Vec<DVec3>,
+    /// By polygon, luminance of its reflectance.
+    reflectances: Vec<f64>,
+    size: f64,
+    /// Rays from each point, and which of all possible ones.
+    rays: u32,
+    turn: u32,
+    /// Irradiance, luminance, W·m⁻², that may be misplaced on account of nodes that stand for the leaves that rays meet.
+    budget: f64,
+}
+
+impl RayGather {
+    /// Prepares `rays` rays a point over a solution's patches. `budget` is how much light, luminance, W·m⁻²,
+    /// nodes may misplace at a point; rays of another `turn` are others.
+    pub fn new(scene: &Scene, solution: &Solution, rays: u32, budget: f64, turn: u32) -> Self {
+        let elements = &solution.elements;
+        let (mut triangles, mut patches) = (Vec::new(), Vec::new());
+        for (id, patch) in (0..).zip(&elements.patches) {
+            let outline = elements.outline(patch.root);
+            for edge in outline[1..].windows(2) {
+                triangles.push([outline[0], edge[0], edge[1]]);
+                patches.push(id);
+            }
+        }
+        let prominent = prominent(scene, solution);
+        let mut place_of = vec![NOT_PROMINENT; elements.patches.len()];
+        for (place, &root) in (0..).zip(&prominent) {
+            place_of[elements.patch_of(root).unwrap_or_default() as usize] = place;
+        }
+        Self {
+            prominent,
+            place_of,
+            bvh: Bvh::of_triangles(triangles),
+            patches,
+            other_sides: other_sides(scene),
+            normals: scene.polygon_ids().map(|polygon| scene.plane(polygon).normal).collect(),
+            reflectances: scene.polygon_ids().map(|polygon| luminance(scene.material(polygon).reflectance)).collect(),
+            size: scene.size(),
+            rays,
+            turn,
+            budget,
+        }
+    }
+
+    /// Appends the nodes of reflectors that a position of a polygon sees; ascending, each once. `inward` is the
+    /// direction in the plane that a position is approached from where other polygons touch it; zero elsewhere.
+    pub fn seen_nodes(
+        &self,
+        solution: &Solution,
+        polygon: u32,
+        position: DVec3,
+        inward: DVec3,
+        seen: &mut Vec<SeenNode>,
+    ) {
+        let from = Origin {
+            polygon,
+            position: position + inward * (ASIDE * self.size),
+            normal: self.normals[polygon as usize],
+            shift: shift(position, self.turn),
+        };
+        let first = seen.len();
+        let mut looked_at = vec![false; self.prominent.len()];
+        for (&root, looked_at) in self.prominent.iter().zip(&mut looked_at) {
+            *looked_at = self.look_at(solution, root, &from, seen);
+        }
+        self.look_around(solution, &from, &looked_at, seen);
+        merge(seen, first);
+    }
+
+    /// Looks at one patch, unless it sends next to nothing to the point. Returns whether it was looked at.
+    fn look_at(&self, solution: &Solution, root: NodeId, from: &Origin, seen: &mut Vec<SeenNode>) -> bool {
+        let elements = &solution.elements;
+        let polygon = elements.polygon_of(root).unwrap_or_default();
+        if self.is_own(from.polygon, polygon) {
+            return false;
+        }
+        let outline = elements.outline(root);
+        if self.normals[polygon as usize].dot(from.position - outline[0]) <= self.size * ASIDE {
+            return false;
+        }
+        let form_factor = form_factor_at(from.position, from.normal, outline);
+        let radiosity = self.reflectances[polygon as usize] * luminance(solution.light[root as usize].irradiance);
+        if form_factor * radiosity <= NEGLIGIBLE * self.budget {
+            return false;
+        }
+        self.open(solution, root, form_factor, from, seen);
+        true
+    }
+
+    /// Adds what is seen of a node of a patch that is looked at; of its parts where the node's plane is not good enough.
+    fn open(&self, solution: &Solution, node: NodeId, form_factor: f64, from: &Origin, seen: &mut Vec<SeenNode>) {
+        if form_factor <= 0.0 {
+            return;
+        }
+        let elements = &solution.elements;
+        let record = &elements.nodes[node as usize];
+        let polygon = elements.polygon_of(node).unwrap_or_default();
+        let light = &solution.light[node as usize];
+        let misplaced = self.reflectances[polygon as usize] * light.deviation * form_factor;
+        if record.child_count > 0 && misplaced > self.budget {
+            for child in elements.children(node) {
+                let part = form_factor_at(from.position, from.normal, elements.outline(child));
+                self.open(solution, child, part, from, seen);
+            }
+            return;
+        }
+        let Some(patch) = elements.patch_of(node) else { return };
+        let outline = elements.outline(node);
+        let normal = self.normals[polygon as usize];
+        let areas: Vec<f64> =
+            outline[1..].windows(2).map(|edge| (edge[0] - outline[0]).cross(edge[1] - outline[0]).length()).collect();
+        let total: f64 = areas.iter().sum();
+        let is_bright = self.reflectances[polygon as usize] * luminance(light.irradiance) * form_factor > self.budget;
+        let rays = AIMED_RAYS[usize::from(is_bright)].max((form_factor * f64::from(self.rays)) as u32);
+        let (mut arrives, mut all, mut middle) = (0.0, 0.0, DVec3::ZERO);
+        for i in 0..rays {
+            let place = spread_over(outline, &areas, total, from.shift + DVec2::splat(f64::from(node) * STEP[0]), i);
+            let way = place - from.position;
+            let square = way.length_squared();
+            let weight =
+                from.normal.dot(way).max(0.0) * normal.dot(way).abs() / (square * square).max(f64::MIN_POSITIVE);
+            if weight <= 0.0 {
+                continue;
+            }
+            all += weight;
+            let hides = |triangle: u32| {
+                let met = elements.patches[self.patches[triangle as usize] as usize].polygon;
+                !self.is_own(from.polygon, met) && !self.is_own(polygon, met)
+            };
+            if !self.bvh.is_blocked_among(from.position, place, hides) {
+                arrives += weight;
+                middle += place * weight;
+            }
+        }
+        if arrives > 0.0 {
+            let offset = elements.patches[patch as usize].along(middle / arrives - record.centre);
+            seen.push(SeenNode { node, form_factor: form_factor * arrives / all, offset });
+        }
+    }
+
+    /// Adds what rays over the hemisphere meet of patches that are not looked at.
+    fn look_around(&self, solution: &Solution, from: &Origin, looked_at: &[bool], seen: &mut Vec<SeenNode>) {
+        let elements = &solution.elements;
+        let share = 1.0 / f64::from(self.rays);
+        for direction in hemisphere(from.normal, self.rays, from.shift) {
+            let meets = |triangle: u32| {
+                let met = elements.patches[self.patches[triangle as usize] as usize].polygon;
+                !self.is_own(from.polygon, met)
+                    && (self.other_sides[met as usize].is_none() || self.normals[met as usize].dot(direction) < 0.0)
+            };
+            let ray = Ray { origin: from.position, direction };
+            let Some(hit) = self.bvh.closest_hit_among(&ray, meets) else { continue };
+            if hit.normal.dot(direction) >= 0.0 {
+                continue; // A back, which is black.
+            }
+            let patch = self.patches[hit.id as usize];
+            if looked_at.get(self.place_of[patch as usize] as usize) == Some(&true) {
+                continue;
+            }
+            let frame = &elements.patches[patch as usize];
+            let place = from.position + direction * hit.distance;
+            let node = self.standing_for(solution, frame, place);
+            let offset = frame.along(place - elements.nodes[node as usize].centre);
+            seen.push(SeenNode { node, form_factor: share, offset });
+        }
+    }
+
+    /// Whether a polygon is the one that rays start from, or its other side.
+    fn is_own(&self, polygon: u32, other: u32) -> bool {
+        other == polygon || self.other_sides[polygon as usize] == Some(other)
+    }
+
+    /// How much light, luminance, W·m⁻², is misplaced at a point where planes that misplace as much as this node's does stand
+    /// for all leaves that it sees: by each ray something else.
+    pub fn misplaced(&self, solution: &Solution, node: NodeId) -> f64 {
+        let polygon = solution.elements.polygon_of(node).unwrap_or_default();
+        self.reflectances[polygon as usize] * solution.light[node as usize].deviation / f64::from(self.rays).sqrt()
+    }
+
+    /// What rays are off by at a point, root mean square, relative to the light over reflectors there: as measured in rooms.
+    pub fn scatter(&self) -> f64 {
+        SCATTER * f64::from(self.rays).powf(-0.75)
+    }
+
+    /// The largest node of a patch around a place that is good enough.
+    fn standing_for(&self, solution: &Solution, patch: &Patch, place: DVec3) -> NodeId {
+        let elements = &solution.elements;
+        let place = patch.along(place - patch.origin);
+        let outside = |child: NodeId| {
+            let cell = &elements.nodes[child as usize];
+            (cell.cell_min - place).max(place - cell.cell_max).max_element()
+        };
+        let mut node = patch.root;
+        while self.misplaced(solution, node) > self.budget
+            && let Some(child) = elements.children(node).min_by(|&a, &b| outside(a).total_cmp(&outside(b)))
+        {
+            node = child;
+        }
+        node
+    }
+}
+
+/// Rays from a point for a source error.
+pub(crate) fn rays_for(source_error: f64) -> u32 {
+    (RAYS * (RAYS_ERROR / source_error).powf(4.0 / 3.0)).clamp(LEAST_RAYS, MOST_RAYS) as u32
+}
+
+/// The patches that reflect most.
+fn prominent(scene: &Scene, solution: &Solution) -> Vec<NodeId> {
+    let elements = &solution.elements;
+    let power = |patch: &Patch| {
+        let reflected = scene.material(patch.polygon).reflectance * solution.light[patch.root as usize].irradiance;
+        luminance(reflected) * elements.nodes[patch.root as usize].area
+    };
+    let mut patches: Vec<(f64, NodeId)> = elements.patches.iter().map(|patch| (power(patch), patch.root)).collect();
+    patches.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+    let mut left = PROMINENT_SHARE * patches.iter().map(|patch| patch.0).sum::<f64>();
+    let needed = patches.iter().take(MOST_PROMINENT).take_while(|patch| {
+        let wanted = left > 0.0;
+        left -= patch.0;
+        wanted
+    });
+    needed.map(|patch| patch.1).collect()
+}
+
+/// Makes one of all that is seen of each node from `first` on.
+fn merge(seen: &mut Vec<SeenNode>, first: usize) {
+    seen[first..].sort_by_key(|seen| seen.node);
+    let mut end = first;
+    for i in first..seen.len() {
+        let next = seen[i];
+        match seen[first..end].last_mut().filter(|last| last.node == next.node) {
+            Some(last) => {
+                let sum = last.form_factor + next.form_factor;
+                last.offset = (last.offset * last.form_factor + next.offset * next.form_factor) / sum;
+                last.form_factor = sum;
+            }
+            None => {
+                seen[end] = next;
+                end += 1;
+            }
+        }
+    }
+    seen.truncate(end);
+}
+
+/// Directions about a normal with a density of the cosine over π: a rank-1 lattice, shifted, spread evenly.
+pub(crate) fn hemisphere(normal: DVec3, count: u32, shift: DVec2) -> impl Iterator<Item = DVec3> {
+    let (x, y) = normal.any_orthonormal_pair();
+    (0..count).map(move |i| {
+        let u = (shift.x + f64::from(i) * STEP[0]).fract();
+        let (sin, cos) = (TAU * (shift.y + f64::from(i) * STEP[1]).fract()).sin_cos();
+        (x * cos + y * sin) * u.sqrt() + normal * (1.0 - u).sqrt()
+    })
+}
+
+/// The place number `i` of places spread evenly over a convex outline by a shifted lattice; fan of triangles has the given areas.
+pub(crate) fn spread_over(outline: &[DVec3], areas: &[f64], total: f64, shift: DVec2, i: u32) -> DVec3 {
+    let (u, v) = ((shift.x + f64::from(i) * STEP[0]).fract(), (shift.y + f64::from(i) * STEP[1]).fract());
+    let mut left = u * total;
+    let triangle = areas.iter().position(|&area| {
+        left -= area;
+        left < 0.0
+    });
+    let triangle = triangle.unwrap_or(areas.len() - 1);
+    let u = (1.0 + left / areas[triangle]).clamp(0.0, 1.0);
+    let (s, t) = (u.sqrt() * (1.0 - v), u.sqrt() * v);
+    outline[0] + (outline[triangle + 1] - outline[0]) * s + (outline[triangle + 2] - outline[0]) * t
+}
+
+/// A shift of the lattices that is another for every position, so that what one point misses its neighbour finds, and for
+/// every turn.
+pub(crate) fn shift(position: DVec3, turn: u32) -> DVec2 {
+    // The finalizer of MurmurHash3 over the position's bits.
+    let mix = |mut bits: u64| {
+        bits = (bits ^ (bits >> 33)).wrapping_mul(0xff51_afd7_ed55_8ccd);
+        bits = (bits ^ (bits >> 33)).wrapping_mul(0xc4ce_b9fe_1a85_ec53);
+        bits ^ (bits >> 33)
+    };
+    let [x, y, z] = position.to_array().map(f64::to_bits);
+    let first = mix(x ^ mix(y ^ mix(z ^ mix(u64::from(turn) + 1))));
+    DVec2::new(first as f64, mix(first) as f64) / (u64::MAX as f64 + 1.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::Builder;
+    use crate::{SolveOptions, solve};
+
+    #[test]
+    fn what_is_seen_of_one_node_is_merged_and_what_was_there_stays() {
+        let seen = |node, form_factor, x| SeenNode { node, form_factor, offset: DVec2::new(x, 0.0) };
+        let mut all = vec![seen(9, 0.5, 0.0), seen(4, 0.1, 1.0), seen(2, 0.1, 0.0), seen(4, 0.3, 2.0)];
+        merge(&mut all, 1);
+        assert_eq!(all[..2], [seen(9, 0.5, 0.0), seen(2, 0.1, 0.0)]);
+        assert_eq!((all.len(), all[2].node), (3, 4));
+        assert!((all[2].form_factor - 0.4).abs() < 1e-15 && (all[2].offset.x - 1.75).abs() < 1e-15);
+        let mut none = Vec::new();
+        merge(&mut none, 0);
+        assert!(none.is_empty());
+    }
+
+    /// In a closed, furnished room what is seen adds up to the hemisphere, whether it is looked at or met.
+    #[test]
+    fn what_is_seen_closes_the_hemisphere() {
+        let room = Builder::default()
+            .material(0.6, 1.0)
+            .cuboid([0.0, 0.0, 0.0], [4.0, 3.0, 2.5], true)
+            .cuboid([0.7, 0.5, 0.05], [1.5, 1.4, 0.8], false)
+            .cuboid([2.2, 1.3, 0.9], [3.5, 2.2, 1.0], false)
+            .build();
+        let solution = solve(&room, &SolveOptions { link_error: Some(0.1), bounces: None }, &|_| ());
+        let gather = RayGather::new(&room, &solution, 256, 1e-3, 0);
+        let mut sums = Vec::new();
+        for i in 0..40 {
+            let position = DVec3::new(0.1 + 0.094 * f64::from(i), 0.2 + f64::from(i * 7 % 40) * 0.065, 0.0);
+            let mut seen = Vec::new();
+            gather.seen_nodes(&solution, 4, position, DVec3::ZERO, &mut seen);
+            let sum: f64 = seen.iter().map(|seen| seen.form_factor).sum();
+            println!("{position} {sum} of {}", seen.len());
+            sums.push(sum - 1.0);
+        }
+        let mean = sums.iter().sum::<f64>() / 40.0;
+        let square = (sums.iter().map(|x| x * x).sum::<f64>() / 40.0).sqrt();
+        println!("{mean} {square}");
+        assert!(mean.abs() < 0.01 && square < 0.05, "{mean} {square}");
+    }
+
+    #[test]
+    fn directions_are_spread_by_the_cosine() {
+        let mean =
+            |f: &dyn Fn(DVec3) -> f64| hemisphere(DVec3::Y, 1000, shift(DVec3::ONE, 0)).map(f).sum::<f64>() / 1000.0;
+        assert!((mean(&|d| d.y) - 2.0 / 3.0).abs() < 2e-3);
+        assert!((mean(&|d| d.x * d.x) - 0.25).abs() < 2e-3 && mean(&|d| d.z).abs() < 2e-3);
+        assert_eq!(hemisphere(DVec3::Z, 0, DVec2::ZERO).count(), 0);
+    }
+}
