@@ -55,7 +55,7 @@ pub enum Command {
 /// `halflight bake`.
 #[derive(Debug, Args)]
 pub struct BakeFlags {
-    /// Scene to bake (OBJ)
+    /// Scene to bake (.obj, .glb, .gltf, or a scene file .toml)
     pub scene: PathBuf,
     /// Where the bake goes
     #[arg(short, long, value_name = "OUT.hlf")]

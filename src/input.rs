@@ -59,8 +59,8 @@ pub fn read_scene(path: &Path) -> Result<(Scene, f64)> {
 pub fn require_light(path: &Path, scene: &Scene) -> Result<()> {
     ensure!(
         scene.emitters().next().is_some(),
-        "{}: nothing emits light; give a material that its faces use an emitted radiance, such as the line \
-         `Ke 10 10 10` (W/(sr m²)) in the MTL file",
+        "{}: nothing emits light; give a material that its faces use an emitted radiance (W/(sr m²)), such as the line \
+         `Ke 10 10 10` in the MTL file, an emissive factor in a glTF file, or `radiance = 10` in a scene file",
         path.display()
     );
     Ok(())

@@ -128,7 +128,7 @@ fn rejoin(triangles: Vec<[u32; 3]>, outline: &[DVec3]) -> Vec<Vec<u32>> {
         object: 0,
         line: 0,
     });
-    let (pieces, _) = merge_triangles(faces.collect(), outline, PLANARITY);
+    let (pieces, _) = merge_triangles(faces.collect(), outline, PLANARITY, &|_| true);
     pieces.into_iter().map(|piece| piece.corners.into_iter().map(|corner| corner.vertex).collect()).collect()
 }
 

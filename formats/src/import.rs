@@ -7,15 +7,19 @@
 use std::collections::HashSet;
 use std::path::Path;
 
+use glam::Vec3;
 use scene::{Polygon, Scene};
 
 use crate::FormatError;
 use crate::camera::default_camera;
 use crate::convex::{Shape, shape_of};
 use crate::face::{Corner, Face, size};
+use crate::gltf::read_gltf;
 use crate::merge::{drop_straight_corners, merge_triangles};
-use crate::obj::{Model, read_obj};
+use crate::model::Model;
+use crate::obj::read_obj;
 use crate::report::{ImportReport, counted};
+use crate::scene_file::read_scene_file;
 use crate::weld::weld;
 
 /// Distance within which positions are one vertex, as a fraction of the scene's size: a few roundings of f32, in
@@ -35,10 +39,22 @@ pub struct Imported {
     pub report: ImportReport,
 }
 
-/// Reads a scene file, by its extension: today Wavefront OBJ with MTL.
+/// Reads a scene file, by its extension: Wavefront OBJ with MTL, glTF 2.0 (`.gltf`, `.glb`), or a scene file
+/// (`.toml`) that puts such models together.
 ///
-/// Lengths are taken as metres, `Kd` as reflectance, `Ke` as emitted radiance in W·sr⁻¹·m⁻²; fronts are where corners
-/// run counter-clockwise. Cameras stand in comments `# camera eye X Y Z dir X Y Z up X Y Z fov_deg D` (the full vertical
+/// Lengths are taken as metres, axes as the file has them; fronts are where corners run counter-clockwise. All surfaces are
+/// diffuse and opaque: what a file says of mirrors, metals and glass is taken by stated rules, which count in the report.
+///
+/// Of an OBJ, `Kd` is the reflectance, `Ke` the emitted radiance in W·sr⁻¹·m⁻², `map_Kd` a texture of the reflectance. A mirror
+/// (`illum` 3, 5, 8) or a metal (`Kd` black, `Ks` not) reflects `Kd` + `Ks` diffusely; `d` below 0.5 is left out.
+///
+/// Of a glTF file, the base colour is the reflectance (of metals, too), the emissive factor times its strength the emitted
+/// radiance, nits per channel taken as W·sr⁻¹·m⁻²; double-sided materials make two polygons, and what is translucent with a
+/// mean alpha below 0.5, or transmits half of the light, is left out. Cameras keep their names.
+///
+/// Light is computed with the mean colour of a texture over each polygon ([`Scene::reflectance`]).
+///
+/// Cameras of an OBJ stand in comments `# camera eye X Y Z dir X Y Z up X Y Z fov_deg D` (the full vertical
 /// angle) and are named camera, camera2 …; a file without one gets a camera named default that shows the whole scene.
 ///
 /// # Errors
@@ -48,14 +64,24 @@ pub fn read_scene(path: &Path) -> Result<Imported, FormatError> {
     let mut report = ImportReport::default();
     let model = match extension.as_deref() {
         Some("obj") => read_obj(path, &mut report)?,
-        _ => return Err(FormatError::content(path, "is no scene file that can be read", "give an .obj file")),
+        Some("gltf" | "glb") => read_gltf(path, &mut report)?,
+        Some("toml") => read_scene_file(path, &mut report)?,
+        _ => {
+            return Err(FormatError::content(
+                path,
+                "is no scene file that can be read",
+                "give an .obj file, a .gltf or .glb one, or a scene file (.toml)",
+            ));
+        }
     };
     let scene = repair(path, model, &mut report)?;
     Ok(Imported { scene, report })
 }
 
 /// Welds, splits and merges until every face is a polygon of a scene.
-fn repair(path: &Path, model: Model, report: &mut ImportReport) -> Result<Scene, FormatError> {
+fn repair(path: &Path, mut model: Model, report: &mut ImportReport) -> Result<Scene, FormatError> {
+    model.separate_untextured();
+    model.split_where_not_affine();
     let tolerance = WELD_DISTANCE * size(&model.positions);
     let (vertices, stands_for) = weld(&model.positions, tolerance);
     report.welded_vertices = model.positions.len() - vertices.len();
@@ -73,17 +99,24 @@ fn repair(path: &Path, model: Model, report: &mut ImportReport) -> Result<Scene,
         sorted.take(face, shape);
     }
     sorted.faces.sort_by_key(|face| face.line);
-    sorted.report(report);
+    sorted.report(if model.places.is_empty() { "line" } else { model.places }, report);
     let count = sorted.faces.len();
-    let (mut faces, united) = merge_triangles(sorted.faces, &vertices, COPLANARITY);
+    let (mut faces, united) = merge_triangles(sorted.faces, &vertices, COPLANARITY, &|corners| {
+        model.attributes.are_affine(corners, &vertices)
+    });
     drop_straight_corners(&mut faces, &united, &vertices);
     report.merged_faces = count - faces.len();
     if faces.is_empty() {
         return Err(FormatError::content(path, "has no face with an area", "check the scene in a modeller"));
     }
 
-    let mut scene =
-        Scene { materials: model.materials, objects: model.objects, cameras: model.cameras, ..Scene::default() };
+    let mut scene = Scene {
+        materials: model.materials,
+        textures: model.textures,
+        objects: model.objects,
+        cameras: model.cameras,
+        ..Scene::default()
+    };
     // Vertices that no polygon uses any more are left out; the others are numbered as polygons come to them.
     let mut new_ids = vec![None; vertices.len()];
     for face in faces {
@@ -99,13 +132,28 @@ fn repair(path: &Path, model: Model, report: &mut ImportReport) -> Result<Scene,
                 scene.vertices.len() as u32 - 1
             });
             scene.corners.push(id);
+            let attributes = model.attributes.get(corner.seam);
+            scene.texture_coordinates.push(attributes.uv.unwrap_or_default());
+            scene.shading_normals.push(attributes.normal.unwrap_or_default());
         }
     }
+    drop_if_unused(&mut scene);
+    scene.tints = scene.mean_texture_colours();
     if scene.cameras.is_empty() {
-        scene.cameras.push(default_camera(&scene));
+        scene.cameras.push(default_camera(&scene, model.up));
     }
     scene.validate().map_err(|source| FormatError::Invalid { path: path.to_owned(), source })?;
     Ok(scene)
+}
+
+/// Leaves out lists of texture coordinates and normals that say nothing.
+fn drop_if_unused(scene: &mut Scene) {
+    if !scene.polygon_ids().any(|polygon| scene.material(polygon).texture.is_some()) {
+        scene.texture_coordinates.clear();
+    }
+    if scene.shading_normals.iter().all(|normal| *normal == Vec3::ZERO) {
+        scene.shading_normals.clear();
+    }
 }
 
 /// Faces that are polygons of a scene, and the lines of those that are not.
@@ -144,7 +192,7 @@ impl Sorted {
         }
     }
 
-    fn report(&self, report: &mut ImportReport) {
+    fn report(&self, place: &str, report: &mut ImportReport) {
         report.degenerate_faces = self.degenerate.len();
         report.crossing_faces = self.crossing.len();
         report.repeated_faces = self.repeated.len();
@@ -160,8 +208,8 @@ impl Sorted {
             ),
         ] {
             if let Some(first) = lines.first() {
-                report
-                    .warn(format!("{} (the first in line {first}) with {what}", counted(lines.len(), "face", "faces")));
+                let count = counted(lines.len(), "face", "faces");
+                report.warn(format!("{count} (the first in {place} {first}) with {what}"));
             }
         }
     }
@@ -260,7 +308,7 @@ mod tests {
             let corners: Vec<_> = vertices.iter().map(|&vertex| Corner { vertex, seam: 0 }).collect();
             without_spikes(&corners).iter().map(|corner| corner.vertex).collect::<Vec<_>>()
         };
-        assert_eq!(tidy(&[]), []);
+        assert_eq!(tidy(&[]), Vec::<u32>::new());
         assert_eq!(tidy(&[1, 1]).len(), 1);
         assert!(tidy(&[1, 2, 1]).len() < 3);
         assert_eq!(tidy(&[1, 1, 2, 3, 3]), [1, 2, 3]);
@@ -305,10 +353,28 @@ mod tests {
     fn triangles_with_different_texture_coordinates_or_normals_at_their_edge_stay_apart() {
         let merged = |text: &str| read(format!("{SQUARE}{text}").as_bytes(), b"").unwrap().report.merged_faces;
         let normals = "vn 0 0 1\nvn 0 0.6 0.8\n";
-        assert_eq!(merged(&format!("{normals}f 1//1 2//2 3//1\nf 1//1 3//1 4//2\n")), 1);
+        assert_eq!(merged(&format!("{normals}f 1//2 2//2 3//1\nf 1//2 3//1 4//1\n")), 1);
+        assert_eq!(merged(&format!("{normals}f 1//1 2//2 3//1\nf 1//1 3//1 4//2\n")), 0, "a saddle");
         assert_eq!(merged(&format!("{normals}f 1//1 2//1 3//1\nf 1//2 3//2 4//2\n")), 0);
-        assert_eq!(merged("vt 0 0\nvt 1 0\nvt 0 0\nf 1/1 2/2 3/1\nf 1/3 3/3 4/2\n"), 1);
-        assert_eq!(merged("vt 0 0\nvt 1 0\nf 1/1 2/2 3/1\nf 1/1 3/2 4/2\n"), 0);
+        // Without a texture its coordinates mean nothing.
+        assert_eq!(merged("vt 0 0\nvt 1 0\nf 1/1 2/2 3/1\nf 1/1 3/2 4/2\n"), 1);
+        let png = image::RgbImage::from_pixel(1, 1, image::Rgb([90; 3]));
+        let folder = tempfile::tempdir().unwrap();
+        png.save(folder.path().join("a.png")).unwrap();
+        std::fs::write(folder.path().join("room.mtl"), "newmtl a\nmap_Kd -s 1 1 a.png\n").unwrap();
+        let textured = |text: &str| {
+            let path = folder.path().join("room.obj");
+            std::fs::write(&path, format!("mtllib room.mtl\nusemtl a\n{SQUARE}{text}")).unwrap();
+            let imported = read_scene(&path).unwrap();
+            assert_eq!(imported.scene.texture_coordinates.len(), imported.scene.corners.len());
+            imported.report.merged_faces
+        };
+        let corners = "vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n";
+        assert_eq!(textured(&format!("{corners}f 1/1 2/2 3/3\nf 1/1 3/3 4/4\n")), 1);
+        assert_eq!(textured(&format!("{corners}f 1/1 2/2 3/3\nf 1/1 3/3 4/3\n")), 0, "another map");
+        assert_eq!(textured(&format!("{corners}f 1/1 2/2 3/3\nf 1/2 3/3 4/4\n")), 0, "other corners");
+        // A quad over which the map is not affine is two triangles over which it is.
+        assert_eq!(textured(&format!("{corners}f 1/1 2/2 3/3 4/3\n")), 0);
     }
 
     #[test]

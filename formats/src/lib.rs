@@ -4,20 +4,27 @@
 //! Every file is written under a temporary name and renamed, so that none is ever half there.
 
 mod atomic_file;
+mod attributes;
 mod baked_file;
 mod camera;
 mod convex;
 mod error;
 mod face;
+mod gltf;
+mod gltf_buffers;
+mod gltf_materials;
 mod image_file;
 mod import;
 mod material_library;
 mod merge;
+mod model;
 mod obj;
 mod obj_text;
 mod points_csv;
 mod record;
 mod report;
+mod scene_file;
+mod texture_file;
 mod weld;
 
 pub use atomic_file::write_atomically;

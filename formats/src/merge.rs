@@ -25,8 +25,15 @@ struct SharedEdge {
 /// `flatness` × its size of one plane. Faces of more corners stay as the file has them. A union stands at the place
 /// of its first part.
 ///
+/// Only what `agrees` with the outline of a union is made.
+///
 /// Returns the faces and, beside each, whether it is a union.
-pub(crate) fn merge_triangles(faces: Vec<Face>, vertices: &[DVec3], flatness: f64) -> (Vec<Face>, Vec<bool>) {
+pub(crate) fn merge_triangles(
+    faces: Vec<Face>,
+    vertices: &[DVec3],
+    flatness: f64,
+    agrees: &dyn Fn(&[Corner]) -> bool,
+) -> (Vec<Face>, Vec<bool>) {
     let mut edges = shared_edges(&faces, vertices);
     let mut faces: Vec<Option<Face>> = faces.into_iter().map(Some).collect();
     let mut united = vec![false; faces.len()];
@@ -40,7 +47,8 @@ pub(crate) fn merge_triangles(faces: Vec<Face>, vertices: &[DVec3], flatness: f6
             if p == q {
                 return false;
             }
-            let Some(corners) = unite(&first.corners, &second.corners, edge.ends, vertices, flatness) else {
+            let union = unite(&first.corners, &second.corners, edge.ends, vertices, flatness);
+            let Some(corners) = union.filter(|corners| agrees(corners)) else {
                 return true;
             };
             let (keep, drop) = (p.min(q), p.max(q));
@@ -179,7 +187,7 @@ mod tests {
     }
 
     fn merge(faces: Vec<Face>, vertices: &[DVec3]) -> Vec<Face> {
-        let (mut faces, united) = merge_triangles(faces, vertices, 1e-6);
+        let (mut faces, united) = merge_triangles(faces, vertices, 1e-6, &|_| true);
         drop_straight_corners(&mut faces, &united, vertices);
         faces
     }

@@ -24,13 +24,28 @@ pub struct ImportReport {
     pub missing_materials: usize,
     /// Materials whose reflectance was limited.
     pub clamped_materials: usize,
-    /// Materials with a texture, which is not read.
+    /// Materials with a texture that is not read: no image, or a texture of something else than reflectance.
     pub textured_materials: usize,
+    /// Materials that reflect as a mirror or a metal does and are taken as diffuse.
+    pub mirror_materials: usize,
+    /// Faces that are seen through for the most part: left out.
+    pub transparent_faces: usize,
     /// One sentence for each kind of problem: how many, where the first is, what was done, and the cure.
     pub warnings: Vec<String>,
 }
 
 impl ImportReport {
+    /// Adds what another import found.
+    pub(crate) fn add(&mut self, other: Self) {
+        self.polygons_read += other.polygons_read;
+        self.missing_materials += other.missing_materials;
+        self.clamped_materials += other.clamped_materials;
+        self.textured_materials += other.textured_materials;
+        self.mirror_materials += other.mirror_materials;
+        self.transparent_faces += other.transparent_faces;
+        self.warnings.extend(other.warnings);
+    }
+
     pub(crate) fn warn(&mut self, sentence: impl Into<String>) {
         self.warnings.push(sentence.into());
     }
