@@ -19,4 +19,5 @@ mod parity;
 mod readme;
 mod reference;
 mod robustness;
+mod textures;
 mod verify;

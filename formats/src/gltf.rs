@@ -1,5 +1,6 @@
 //! glTF 2.0 and GLB: nodes, meshes and cameras → a model. Materials are in `gltf_materials`, numbers in `gltf_buffers`.
 
+use std::collections::HashMap;
 use std::fs;
 use std::path::Path;
 
@@ -128,9 +129,9 @@ impl Reader<'_> {
             None => document.nodes().map(|node| (node, DMat4::IDENTITY)).collect(),
         };
         if scene.is_none() {
-            let children: Vec<usize> =
-                document.nodes().flat_map(|n| n.children().map(|c| c.index()).collect::<Vec<_>>()).collect();
-            open.retain(|(node, _)| !children.contains(&node.index()));
+            let mut is_child = vec![false; known.len()];
+            document.nodes().for_each(|node| node.children().for_each(|child| is_child[child.index()] = true));
+            open.retain(|(node, _)| !is_child[node.index()]);
         }
         open.reverse();
         while let Some((node, above)) = open.pop() {
@@ -203,7 +204,8 @@ impl Reader<'_> {
             return Ok(());
         }
         let sides = if material.is_two_sided { 2 } else { 1 };
-        if self.model.faces.len() + sides * triangles.len() > MOST_TRIANGLES {
+        let vertices = self.model.positions.len() + count;
+        if self.model.faces.len() + sides * triangles.len() > MOST_TRIANGLES || vertices > 3 * MOST_TRIANGLES {
             return Err(self.wrong(format!("{place} is beyond {MOST_TRIANGLES} triangles"), "split the scene"));
         }
         let normals = match primitive.get(&Semantic::Normals) {
@@ -290,13 +292,14 @@ fn name_of(node: &Node<'_>) -> String {
 
 /// Cameras are called by name: of two with one name the later gets a number.
 pub(crate) fn unique_names(cameras: &mut [NamedCamera]) {
-    for i in 0..cameras.len() {
-        let wanted = cameras[i].name.clone();
-        let mut number = 2;
-        while cameras[..i].iter().any(|other| other.name == cameras[i].name) {
-            cameras[i].name = format!("{wanted}{number}");
-            number += 1;
+    let mut known: HashMap<String, u32> = HashMap::new();
+    for camera in cameras {
+        let wanted = camera.name.clone();
+        while known.contains_key(&camera.name) {
+            let number = known.entry(wanted.clone()).and_modify(|number| *number += 1).or_insert(1);
+            camera.name = format!("{wanted}{number}");
         }
+        known.insert(camera.name.clone(), 1);
     }
 }
 

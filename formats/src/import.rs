@@ -430,6 +430,17 @@ mod tests {
         assert!(scene.emitters().count() >= 2);
     }
 
+    #[test]
+    fn a_scene_file_over_the_office() {
+        let Imported { scene, report } = data("office_evening.toml");
+        let office = data("office.obj").scene;
+        assert_eq!((&scene.vertices, &scene.corners), (&office.vertices, &office.corners));
+        assert_eq!(report.warnings, Vec::<String>::new());
+        assert!(scene.emitters().all(|polygon| scene.material(polygon).name == "bulb"));
+        let names: Vec<_> = scene.cameras.iter().map(|named| named.name.as_str()).collect();
+        assert_eq!(names, ["desk", "camera"]);
+    }
+
     /// The left wall is a warped quad in the published measurements (its lower corners lie at 0.5528 and 0.5496 m, its
     /// upper ones at 0.556 m): the file has it as two triangles that are not coplanar, and they stay two.
     #[test]

@@ -148,7 +148,9 @@ type Wrong = (String, &'static str);
 
 /// Reads a scene file and the models that it names.
 pub(crate) fn read_scene_file(path: &Path, report: &mut ImportReport) -> Result<Model, FormatError> {
-    let text = fs::read_to_string(path).map_err(|error| FormatError::read(path, error))?;
+    let bytes = fs::read(path).map_err(|error| FormatError::read(path, error))?;
+    let text = String::from_utf8(bytes)
+        .map_err(|_| FormatError::content(path, "is no text in UTF-8", "give a scene file in TOML"))?;
     let line = |place: usize| text.bytes().take(place).filter(|byte| *byte == b'\n').count() + 1;
     let wrong = |place: usize| move |(cause, cure): Wrong| FormatError::line(path, line(place), cause, cure);
     let file: SceneFile = toml::from_str(&text).map_err(|error| {

@@ -94,6 +94,55 @@ impl Scene {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::{Material, Polygon, Texture};
+
+    /// A square of 2 m whose left half is white and whose right half is black.
+    fn square() -> Scene {
+        let corners = [(0.0, 0.0), (2.0, 0.0), (2.0, 2.0), (0.0, 2.0)];
+        let mut scene = Scene {
+            vertices: corners.map(|(x, y)| DVec3::new(x, y, 1.0)).to_vec(),
+            corners: (0..4).collect(),
+            texture_coordinates: corners.map(|(x, y)| DVec2::new(x, -y).as_vec2() / 2.0).to_vec(),
+            polygons: vec![Polygon { first_corner: 0, corner_count: 4, material: 0, object: 0 }],
+            materials: vec![Material { texture: Some(0), ..Material::grey("halves") }],
+            textures: vec![Texture { name: "halves".into(), width: 2, height: 1, texels: vec![[255; 3], [0; 3]] }],
+            objects: vec!["square".into()],
+            ..Scene::default()
+        };
+        scene.tints = scene.mean_texture_colours();
+        scene
+    }
+
+    #[test]
+    fn a_polygon_reflects_by_the_mean_of_its_texture() {
+        let scene = square();
+        assert_eq!(scene.validate(), Ok(()));
+        assert!((scene.reflectance(0) - Rgb::splat(0.25)).length() < 1e-4, "{}", scene.reflectance(0));
+        let mut point = scene.clone();
+        point.texture_coordinates = vec![Vec2::new(0.25, 0.5); 4];
+        assert_eq!(point.mean_texture_colours(), [Rgb::ONE]);
+        let plain = Scene { texture_coordinates: vec![], ..square() };
+        assert!(plain.mean_texture_colours().is_empty());
+    }
+
+    #[test]
+    fn textures_that_are_not_whole_are_not_valid() {
+        let changes: [fn(&mut Scene); 8] = [
+            |scene| scene.texture_coordinates.clear(),
+            |scene| scene.texture_coordinates[1].x = f32::NAN,
+            |scene| scene.tints.clear(),
+            |scene| scene.tints[0].y = 1.5,
+            |scene| scene.textures.clear(),
+            |scene| scene.textures[0].texels.clear(),
+            |scene| scene.textures[0].width = u32::MAX,
+            |scene| scene.shading_normals = vec![glam::Vec3::Z; 3],
+        ];
+        for (i, change) in changes.into_iter().enumerate() {
+            let mut scene = square();
+            change(&mut scene);
+            assert!(scene.validate().is_err(), "change {i}");
+        }
+    }
 
     #[test]
     fn a_map_through_a_quad_and_through_nothing() {

@@ -263,6 +263,10 @@ fn cameras_have_their_names_and_look_along_minus_z() {
     .scene;
     let names: Vec<_> = scene.cameras.iter().map(|named| named.name.as_str()).collect();
     assert_eq!(names, ["door", "door2"]);
+    let mut cameras = vec![scene.cameras[0].clone(); 3];
+    cameras[1].name = "door2".to_owned();
+    super::unique_names(&mut cameras);
+    assert_eq!(cameras.iter().map(|named| named.name.as_str()).collect::<Vec<_>>(), ["door", "door2", "door3"]);
     let [first, second] = [0, 1].map(|i| scene.cameras[i].camera);
     assert_eq!((first.eye, first.target, first.up), (DVec3::new(1., 2., 3.), DVec3::new(1., 2., 2.), DVec3::Y));
     assert!((second.target - DVec3::Z).length() < 1e-6 && (first.vertical_fov - 0.9).abs() < 1e-6);
