@@ -436,7 +436,9 @@ mod tests {
         let office = data("office.obj").scene;
         assert_eq!((&scene.vertices, &scene.corners), (&office.vertices, &office.corners));
         assert_eq!(report.warnings, Vec::<String>::new());
-        assert!(scene.emitters().all(|polygon| scene.material(polygon).name == "bulb"));
+        let material = |name: &str| scene.materials.iter().find(|material| material.name == name).unwrap();
+        assert_eq!(material("panel").radiance, DVec3::new(7.0, 5.5, 3.5));
+        assert_eq!(material("wall").reflectance, DVec3::new(0.62, 0.5, 0.42));
         let names: Vec<_> = scene.cameras.iter().map(|named| named.name.as_str()).collect();
         assert_eq!(names, ["desk", "camera"]);
     }
