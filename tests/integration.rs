@@ -11,6 +11,9 @@ mod closed_forms;
 mod continuity;
 mod determinism;
 mod fixture;
+#[path = "../benches/common/generated/mod.rs"]
+mod generated;
+mod generated_scenes;
 mod golden;
 mod known_issues;
 mod leaks;
