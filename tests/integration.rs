@@ -20,6 +20,7 @@ mod leaks;
 mod licences;
 mod parity;
 mod readme;
+mod real_scenes;
 mod reference;
 mod robustness;
 mod verify;

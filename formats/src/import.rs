@@ -7,6 +7,7 @@
 use std::collections::HashSet;
 use std::path::Path;
 
+use glam::DVec3;
 use scene::{Polygon, Scene};
 
 use crate::FormatError;
@@ -15,6 +16,7 @@ use crate::convex::{Shape, shape_of};
 use crate::face::{Corner, Face, size};
 use crate::merge::{drop_straight_corners, merge_triangles};
 use crate::obj::{Model, read_obj};
+use crate::repair::{add_other_sides, close_junctions, orient, warn_of_winding};
 use crate::report::{ImportReport, counted};
 use crate::weld::weld;
 
@@ -35,6 +37,26 @@ pub struct Imported {
     pub report: ImportReport,
 }
 
+/// Which sides of a file's faces are surfaces.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Sides {
+    /// Fronts alone, where corners run counter-clockwise.
+    #[default]
+    AsWound,
+    /// Both, where a file's winding is not to be trusted: every polygon gets its other side, of the same material, unless the
+    /// file has it or the polygon is part of a closed solid or of a closed room around a lamp or camera, wound
+    /// consistently and with its fronts where they are seen from. A lamp then shines on both sides.
+    Both,
+}
+
+/// Reads a scene file, its faces as they are wound: [`read_scene_as`].
+///
+/// # Errors
+/// Those of [`read_scene_as`].
+pub fn read_scene(path: &Path) -> Result<Imported, FormatError> {
+    read_scene_as(path, Sides::AsWound)
+}
+
 /// Reads a scene file, by its extension: today Wavefront OBJ with MTL.
 ///
 /// Lengths are taken as metres, `Kd` as reflectance, `Ke` as emitted radiance in W·sr⁻¹·m⁻²; fronts are where corners
@@ -43,24 +65,37 @@ pub struct Imported {
 ///
 /// # Errors
 /// A file that cannot be read, is of another kind, has a line that is wrong (the error names it) or holds no polygon.
-pub fn read_scene(path: &Path) -> Result<Imported, FormatError> {
+pub fn read_scene_as(path: &Path, sides: Sides) -> Result<Imported, FormatError> {
     let extension = path.extension().map(|extension| extension.to_string_lossy().to_ascii_lowercase());
     let mut report = ImportReport::default();
     let model = match extension.as_deref() {
         Some("obj") => read_obj(path, &mut report)?,
         _ => return Err(FormatError::content(path, "is no scene file that can be read", "give an .obj file")),
     };
-    let scene = repair(path, model, &mut report)?;
+    // A camera that shows all of a scene stands outside of it, among backs: it says nothing of the winding.
+    let cameras = model.cameras.len();
+    let mut scene = repair(path, model, &mut report)?;
+    if sides == Sides::Both {
+        let sides = add_other_sides(&mut scene, cameras);
+        report.other_sides = sides.added;
+        if sides.emitting > 0 {
+            report.warn(format!(
+                "{} on both sides now, with twice the power; close the lamps' cases in the modeller if that is not meant",
+                counted(sides.emitting, "polygon emits", "polygons emit")
+            ));
+        }
+    }
+    warn_of_winding(&scene, cameras, &mut report);
     Ok(Imported { scene, report })
 }
 
 /// Welds, splits and merges until every face is a polygon of a scene.
-fn repair(path: &Path, model: Model, report: &mut ImportReport) -> Result<Scene, FormatError> {
+fn repair(path: &Path, mut model: Model, report: &mut ImportReport) -> Result<Scene, FormatError> {
     let tolerance = WELD_DISTANCE * size(&model.positions);
     let (vertices, stands_for) = weld(&model.positions, tolerance);
     report.welded_vertices = model.positions.len() - vertices.len();
 
-    let mut faces = model.faces;
+    let mut faces = std::mem::take(&mut model.faces);
     for face in &mut faces {
         face.corners.iter_mut().for_each(|corner| corner.vertex = stands_for[corner.vertex as usize]);
         face.corners = without_spikes(&face.corners);
@@ -78,6 +113,7 @@ fn repair(path: &Path, model: Model, report: &mut ImportReport) -> Result<Scene,
     let (mut faces, united) = merge_triangles(sorted.faces, &vertices, COPLANARITY);
     drop_straight_corners(&mut faces, &united, &vertices);
     report.merged_faces = count - faces.len();
+    repair_edges(&mut faces, &vertices, &model, report);
     if faces.is_empty() {
         return Err(FormatError::content(path, "has no face with an area", "check the scene in a modeller"));
     }
@@ -106,6 +142,35 @@ fn repair(path: &Path, model: Model, report: &mut ImportReport) -> Result<Scene,
     }
     scene.validate().map_err(|source| FormatError::Invalid { path: path.to_owned(), source })?;
     Ok(scene)
+}
+
+/// Closes T-junctions and turns faces that disagree with their neighbours.
+fn repair_edges(faces: &mut [Face], vertices: &[DVec3], model: &Model, report: &mut ImportReport) {
+    let junctions = close_junctions(faces, vertices);
+    report.junctions = junctions.closed;
+    report.open_junctions = junctions.left;
+    if junctions.left > 0 {
+        report.warn(format!(
+            "{} almost on a neighbour's edge and stay open: weld the edges in the modeller",
+            counted(junctions.left, "corner lies", "corners lie")
+        ));
+    }
+    let winding = orient(faces, vertices, |face| model.materials[face.material as usize].emits());
+    report.turned_faces = winding.turned.len();
+    report.one_sided_surfaces = winding.one_sided;
+    if let Some(first) = winding.turned.first() {
+        report.warn(format!(
+            "{} (the first in line {first}) wound against the larger part of the surface around, turned: recalculate the \
+             normals in the modeller",
+            counted(winding.turned.len(), "face was", "faces were")
+        ));
+    }
+    if winding.one_sided > 0 {
+        report.warn(format!(
+            "{} wound in no consistent way, because one side leads to the other, and stay: give --two-sided if they look black",
+            counted(winding.one_sided, "surface is", "surfaces are")
+        ));
+    }
 }
 
 /// Faces that are polygons of a scene, and the lines of those that are not.
@@ -202,7 +267,6 @@ fn canonical(corners: &[Corner]) -> Vec<u32> {
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
-    use glam::DVec3;
     use proptest::prelude::*;
 
     use super::*;

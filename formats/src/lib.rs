@@ -17,6 +17,7 @@ mod obj;
 mod obj_text;
 mod points_csv;
 mod record;
+mod repair;
 mod report;
 mod weld;
 
@@ -24,6 +25,6 @@ pub use atomic_file::write_atomically;
 pub use baked_file::{is_baked, read_baked, write_baked};
 pub use error::FormatError;
 pub use image_file::{read_exr, read_png, write_exr, write_png};
-pub use import::{Imported, read_scene};
+pub use import::{Imported, Sides, read_scene, read_scene_as};
 pub use points_csv::{SurfaceQuery, read_points, write_irradiance};
 pub use report::ImportReport;
