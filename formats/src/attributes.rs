@@ -25,15 +25,13 @@ pub(crate) struct Attributes {
     pub uv: Option<Vec2>,
     /// Unit shading normal; none where the face's own stands.
     pub normal: Option<Vec3>,
-    /// Whether it belongs to the back of a two-sided face: backs merge with backs.
-    pub is_back: bool,
 }
 
 /// The attributes of a model; a [`Corner::seam`] is an index into it, and 0 is none.
 #[derive(Clone, Debug)]
 pub(crate) struct AttributeTable {
     list: Vec<Attributes>,
-    known: HashMap<[u32; 7], u32>,
+    known: HashMap<[u32; 6], u32>,
 }
 
 impl Default for AttributeTable {
@@ -69,11 +67,35 @@ impl AttributeTable {
     pub fn intern(&mut self, attributes: Attributes) -> u32 {
         let uv = attributes.uv.map_or([0, 0, 0], |uv| [1, uv.x.to_bits(), uv.y.to_bits()]);
         let normal = attributes.normal.unwrap_or_default().to_array().map(f32::to_bits);
-        let key = [uv[0], uv[1], uv[2], normal[0], normal[1], normal[2], attributes.is_back.into()];
+        let key = [uv[0], uv[1], uv[2], normal[0], normal[1], normal[2]];
         *self.known.entry(key).or_insert_with(|| {
             self.list.push(attributes);
             self.list.len() as u32 - 1
         })
+    }
+
+    /// The seam of a corner between those of two seams, of which it has the fraction `along` from the first to the second;
+    /// what one of them lacks it has not.
+    pub fn between(&mut self, ends: [u32; 2], along: f64) -> u32 {
+        if ends[0] == ends[1] {
+            return ends[0];
+        }
+        let ([from, to], along) = (ends.map(|seam| self.get(seam)), along as f32);
+        let uv = from.uv.zip(to.uv).map(|(from, to)| from.lerp(to, along));
+        let normal = from.normal.zip(to.normal).map(|(from, to)| from.lerp(to, along).normalize_or_zero());
+        self.intern(Attributes { uv, normal: normal.filter(|normal| *normal != Vec3::ZERO) })
+    }
+
+    /// Turns the normals of a face that was turned to its front, where they are not: the winding may have been the only thing
+    /// wrong.
+    pub fn turn_to_front(&mut self, corners: &mut [Corner], vertices: &[DVec3]) {
+        let outline = outline(corners, vertices);
+        let front = area_vector(&outline);
+        let to_front = |normal: Vec3| if normal.as_dvec3().dot(front) < 0.0 { -normal } else { normal };
+        let mut attributes: Vec<Attributes> = corners.iter().map(|corner| self.get(corner.seam)).collect();
+        attributes.iter_mut().for_each(|corner| corner.normal = corner.normal.map(to_front));
+        let seams = self.seams(&outline, &mut attributes);
+        corners.iter_mut().zip(seams).for_each(|(corner, seam)| corner.seam = seam);
     }
 
     /// Appends another model's table, its normals turned; what each of its seams is here.
@@ -121,15 +143,51 @@ mod tests {
         let mut table = AttributeTable::default();
         let outline = [DVec3::ZERO, DVec3::X, DVec3::Y];
         let seams = |table: &mut AttributeTable, normal: Vec3, uv: Option<Vec2>| {
-            table.seams(&outline, &mut [Attributes { uv, normal: Some(normal), is_back: false }; 3])
+            table.seams(&outline, &mut [Attributes { uv, normal: Some(normal) }; 3])
         };
         for normal in [Vec3::Z * 7.0, Vec3::ZERO, Vec3::NAN, Vec3::new(0.005, 0.0, 1.0)] {
             assert_eq!(seams(&mut table, normal, None), [0; 3]);
             assert_eq!(seams(&mut table, normal, Some(Vec2::splat(f32::INFINITY))), [0; 3]);
         }
         assert_eq!(seams(&mut table, Vec3::X * 3.0, Some(Vec2::Y)), [1; 3]);
-        assert_eq!(table.get(1), Attributes { uv: Some(Vec2::Y), normal: Some(Vec3::X), is_back: false });
+        assert_eq!(table.get(1), Attributes { uv: Some(Vec2::Y), normal: Some(Vec3::X) });
         assert_eq!(table.get(9), Attributes::default());
+    }
+
+    #[test]
+    fn between_two_seams_is_what_both_have() {
+        let mut table = AttributeTable::default();
+        let seam = |table: &mut AttributeTable, u: Option<f32>, normal: Option<Vec3>| {
+            table.intern(Attributes { uv: u.map(Vec2::splat), normal })
+        };
+        let a = seam(&mut table, Some(1.0), Some(Vec3::X));
+        let b = seam(&mut table, Some(3.0), Some(Vec3::Y));
+        let only_uv = seam(&mut table, Some(3.0), None);
+        let opposite = seam(&mut table, None, Some(-Vec3::X));
+        assert_eq!((table.between([0, 0], 0.3), table.between([a, a], 0.3), table.between([0, a], 0.3)), (0, a, 0));
+        let between = table.between([a, b], 0.5);
+        assert_eq!(table.get(between).uv, Some(Vec2::splat(2.0)));
+        assert!(table.get(between).normal.is_some_and(|n| (n - Vec3::new(1., 1., 0.).normalize()).length() < 1e-6));
+        let between = table.between([a, only_uv], 0.25);
+        assert_eq!(table.get(between), Attributes { uv: Some(Vec2::splat(1.5)), normal: None });
+        assert_eq!(table.between([a, opposite], 0.5), 0);
+    }
+
+    #[test]
+    fn normals_of_a_turned_face_look_to_its_front() {
+        let mut table = AttributeTable::default();
+        let vertices = [DVec3::ZERO, DVec3::X, DVec3::Y];
+        let slanted = Vec3::new(0.6, 0.0, 0.8);
+        let mut turned = |normals: [Vec3; 3]| {
+            let mut corners = [0, 1, 2].map(|vertex| {
+                let seam = table.intern(Attributes { uv: None, normal: Some(normals[vertex as usize]) });
+                Corner { vertex, seam }
+            });
+            table.turn_to_front(&mut corners, &vertices);
+            corners.map(|corner| table.get(corner.seam).normal)
+        };
+        assert_eq!(turned([-slanted, slanted, -Vec3::Z]), [Some(slanted), Some(slanted), Some(Vec3::Z)]);
+        assert_eq!(turned([-Vec3::Z; 3]), [None; 3]);
     }
 
     #[test]

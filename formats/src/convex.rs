@@ -11,7 +11,7 @@ use crate::merge::{STRAIGHT, merge_triangles};
 
 /// Largest distance of a corner from its polygon's plane, as a fraction of the polygon's size: coordinates written
 /// with six digits pass, a quad that is visibly bent does not.
-const PLANARITY: f64 = 1e-5;
+pub(crate) const PLANARITY: f64 = 1e-5;
 
 /// Largest part of an outline's area that its triangles may miss or cover twice before it counts as crossing itself;
 /// far above rounding, and a crossing that small could not be seen.

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use ::gltf::mesh::Mode;
 use ::gltf::{Document, Node, Primitive, Semantic};
-use glam::{DMat3, DMat4, DVec3, Vec2, Vec3};
+use glam::{DMat3, DMat4, DVec3, Vec2};
 use scene::{Camera, NamedCamera};
 
 use crate::FormatError;
@@ -35,7 +35,8 @@ pub(crate) fn read_gltf(path: &Path, report: &mut ImportReport) -> Result<Model,
     let buffers = Buffers::read(path, &document, binary)?;
     let mut model = Model { up: Some(DVec3::Y), places: "triangle", ..Model::default() };
     let materials = read_materials(path, &document, &buffers, &mut model, report)?;
-    let mut reader = Reader { path, document: &document, buffers, materials, model, triangles: 0, skipped: Vec::new() };
+    let mut reader =
+        Reader { path, document: &document, buffers, materials, model, triangles: 0, polygons: 0, skipped: Vec::new() };
     reader.read_nodes()?;
     let Reader { mut model, triangles, skipped, materials, .. } = reader;
     report.polygons_read = triangles;
@@ -110,6 +111,8 @@ struct Reader<'a> {
     materials: GltfMaterials,
     model: Model,
     triangles: usize,
+    /// Triangles that are kept, those of two sides twice.
+    polygons: usize,
     /// Primitives that are no surfaces.
     skipped: Vec<String>,
 }
@@ -203,9 +206,10 @@ impl Reader<'_> {
             self.materials.transparent_triangles += triangles.len();
             return Ok(());
         }
-        let sides = if material.is_two_sided { 2 } else { 1 };
+        let sides = if self.model.two_sided.contains_key(&material.material) { 2 } else { 1 };
+        self.polygons += sides * triangles.len();
         let vertices = self.model.positions.len() + count;
-        if self.model.faces.len() + sides * triangles.len() > MOST_TRIANGLES || vertices > 3 * MOST_TRIANGLES {
+        if self.polygons > MOST_TRIANGLES || vertices > 3 * MOST_TRIANGLES {
             return Err(self.wrong(format!("{place} is beyond {MOST_TRIANGLES} triangles"), "split the scene"));
         }
         let normals = match primitive.get(&Semantic::Normals) {
@@ -239,30 +243,19 @@ impl Reader<'_> {
             normal: normals
                 .get(vertex as usize)
                 .map(|&normal| (cofactors * DVec3::from_array(normal) * flip).normalize_or_zero().as_vec3()),
-            is_back: false,
         };
         let object = self.model.objects.len() as u32 - 1;
         for mut triangle in triangles {
             if is_mirrored {
                 triangle.swap(1, 2);
             }
-            let own = triangle.map(attributes);
             let outline = triangle.map(|vertex| self.model.positions[(first_vertex + vertex) as usize]);
-            let mut add = |order: [usize; 3], normals: f32| {
-                let mut attributes = order.map(|i| {
-                    let normal = own[i].normal.map(|normal: Vec3| normal * normals);
-                    Attributes { normal, is_back: normals < 0.0, ..own[i] }
-                });
-                let seams = self.model.attributes.seams(&order.map(|i| outline[i]), &mut attributes);
-                let corners =
-                    order.iter().zip(seams).map(|(&i, seam)| Corner { vertex: first_vertex + triangle[i], seam });
-                let line = self.model.faces.len() + 1;
-                self.model.faces.push(Face { corners: corners.collect(), material: material.material, object, line });
-            };
-            add([0, 1, 2], 1.0);
-            if material.is_two_sided {
-                add([2, 1, 0], -1.0);
-            }
+            let mut own = triangle.map(attributes);
+            let seams = self.model.attributes.seams(&outline, &mut own);
+            let corners =
+                triangle.iter().zip(seams).map(|(&vertex, seam)| Corner { vertex: first_vertex + vertex, seam });
+            let line = self.model.faces.len() + 1;
+            self.model.faces.push(Face { corners: corners.collect(), material: material.material, object, line });
         }
         Ok(())
     }

@@ -21,8 +21,6 @@ pub(crate) struct GltfMaterial {
     pub material: u32,
     /// Seen through for the most part.
     pub is_left_out: bool,
-    /// Every triangle becomes two of opposite winding.
-    pub is_two_sided: bool,
     /// The set of texture coordinates that the texture is placed by, if there is one.
     pub uv_set: Option<u32>,
     /// KHR_texture_transform: offset, rotation (radians) and scale.
@@ -99,7 +97,7 @@ impl GltfMaterials {
 ///   format says nits, W·sr⁻¹·m⁻² are taken. An emissive texture counts with its mean.
 /// - What emits nothing and is seen through for the most part is left out: alpha mode BLEND or MASK and a mean alpha, factor
 ///   times texture, below 0.5; or a transmission factor of 0.5 or more. Everything else is opaque.
-/// - A double-sided material makes two polygons of every triangle, which reflect and emit on their sides.
+/// - A double-sided material has polygons on both sides, which reflect and emit on theirs; one that is not says nothing.
 /// - Textures repeat, whatever their samplers say.
 pub(crate) fn read_materials(
     path: &Path,
@@ -115,11 +113,10 @@ pub(crate) fn read_materials(
         let pbr = material.pbr_metallic_roughness();
         let [r, g, b, mut alpha] = pbr.base_color_factor().map(f64::from);
         let mut reflectance = finite(DVec3::new(r, g, b));
-        let mut found = GltfMaterial {
-            material: model.materials.len() as u32,
-            is_two_sided: material.double_sided(),
-            ..GltfMaterial::default()
-        };
+        let mut found = GltfMaterial { material: model.materials.len() as u32, ..GltfMaterial::default() };
+        if material.double_sided() {
+            model.two_sided.insert(found.material, true);
+        }
         let mut base_texture = None;
         if let Some(info) = pbr.base_color_texture() {
             match images.texture(&info.texture(), model, report)? {

@@ -4,10 +4,10 @@
 //! that what is not convex or not planar is split, and that repeated vertices are welded: silhouettes are edges
 //! between neighbours, and without shared vertices every edge of a mesh would cast a shadow line of its own.
 
-use std::collections::HashSet;
+use std::collections::{BTreeMap, HashSet};
 use std::path::Path;
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use scene::{Polygon, Scene};
 
 use crate::FormatError;
@@ -18,6 +18,7 @@ use crate::gltf::read_gltf;
 use crate::merge::{drop_straight_corners, merge_triangles};
 use crate::model::Model;
 use crate::obj::read_obj;
+use crate::repair::{add_other_sides, close_junctions, orient, warn_of_winding};
 use crate::report::{ImportReport, counted};
 use crate::scene_file::read_scene_file;
 use crate::weld::weld;
@@ -37,6 +38,27 @@ pub struct Imported {
     pub scene: Scene,
     /// What was found and repaired.
     pub report: ImportReport,
+}
+
+/// Which sides of a file's faces are surfaces.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Sides {
+    /// Fronts, where corners run counter-clockwise, and backs where the file says that a material has them.
+    #[default]
+    AsWound,
+    /// Both, where a file's winding is not to be trusted: every polygon gets its other side, of the same material, unless the
+    /// file has it, or says of the material that it has none, or the polygon is part of a closed solid or of a closed room
+    /// around a lamp or camera, wound consistently and with its fronts where they are seen from. A lamp then shines on both
+    /// sides.
+    Both,
+}
+
+/// Reads a scene file, its faces as they are wound: [`read_scene_as`].
+///
+/// # Errors
+/// Those of [`read_scene_as`].
+pub fn read_scene(path: &Path) -> Result<Imported, FormatError> {
+    read_scene_as(path, Sides::AsWound)
 }
 
 /// Reads a scene file, by its extension: Wavefront OBJ with MTL, glTF 2.0 (`.gltf`, `.glb`), or a scene file
@@ -59,7 +81,7 @@ pub struct Imported {
 ///
 /// # Errors
 /// A file that cannot be read, is of another kind, has a line that is wrong (the error names it) or holds no polygon.
-pub fn read_scene(path: &Path) -> Result<Imported, FormatError> {
+pub fn read_scene_as(path: &Path, sides: Sides) -> Result<Imported, FormatError> {
     let extension = path.extension().map(|extension| extension.to_string_lossy().to_ascii_lowercase());
     let mut report = ImportReport::default();
     let model = match extension.as_deref() {
@@ -74,19 +96,22 @@ pub fn read_scene(path: &Path) -> Result<Imported, FormatError> {
             ));
         }
     };
-    let scene = repair(path, model, &mut report)?;
+    // A camera that shows all of a scene stands outside of it, among backs: it says nothing of the winding.
+    let cameras = model.cameras.len();
+    let scene = repair(path, model, sides, &mut report)?;
+    warn_of_winding(&scene, cameras, &mut report);
     Ok(Imported { scene, report })
 }
 
 /// Welds, splits and merges until every face is a polygon of a scene.
-fn repair(path: &Path, mut model: Model, report: &mut ImportReport) -> Result<Scene, FormatError> {
+fn repair(path: &Path, mut model: Model, sides: Sides, report: &mut ImportReport) -> Result<Scene, FormatError> {
     model.separate_untextured();
     model.split_where_not_affine();
     let tolerance = WELD_DISTANCE * size(&model.positions);
     let (vertices, stands_for) = weld(&model.positions, tolerance);
     report.welded_vertices = model.positions.len() - vertices.len();
 
-    let mut faces = model.faces;
+    let mut faces = std::mem::take(&mut model.faces);
     for face in &mut faces {
         face.corners.iter_mut().for_each(|corner| corner.vertex = stands_for[corner.vertex as usize]);
         face.corners = without_spikes(&face.corners);
@@ -99,13 +124,14 @@ fn repair(path: &Path, mut model: Model, report: &mut ImportReport) -> Result<Sc
         sorted.take(face, shape);
     }
     sorted.faces.sort_by_key(|face| face.line);
-    sorted.report(if model.places.is_empty() { "line" } else { model.places }, report);
+    sorted.report(model.place(), report);
     let count = sorted.faces.len();
     let (mut faces, united) = merge_triangles(sorted.faces, &vertices, COPLANARITY, &|corners| {
         model.attributes.are_affine(corners, &vertices)
     });
     drop_straight_corners(&mut faces, &united, &vertices);
     report.merged_faces = count - faces.len();
+    repair_edges(&mut faces, &vertices, &mut model, report);
     if faces.is_empty() {
         return Err(FormatError::content(path, "has no face with an area", "check the scene in a modeller"));
     }
@@ -139,11 +165,25 @@ fn repair(path: &Path, mut model: Model, report: &mut ImportReport) -> Result<Sc
     }
     drop_if_unused(&mut scene);
     scene.tints = scene.mean_texture_colours();
+    add_sides(&mut scene, sides, &model.two_sided, report);
     if scene.cameras.is_empty() {
         scene.cameras.push(default_camera(&scene, model.up));
     }
     scene.validate().map_err(|source| FormatError::Invalid { path: path.to_owned(), source })?;
     Ok(scene)
+}
+
+/// Gives polygons the other sides that their materials or `sides` ask for.
+fn add_sides(scene: &mut Scene, sides: Sides, said: &BTreeMap<u32, bool>, report: &mut ImportReport) {
+    let added = add_other_sides(scene, sides == Sides::Both, said);
+    report.other_sides = added.added;
+    if added.doubtful_lamps > 0 {
+        report.warn(format!(
+            "{} on both sides now, with twice the power; if that is not meant, close the lamps' cases in the modeller, or write \
+             two_sided = false for their material in a scene file",
+            counted(added.doubtful_lamps, "polygon emits", "polygons emit")
+        ));
+    }
 }
 
 /// Leaves out lists of texture coordinates and normals that say nothing.
@@ -153,6 +193,43 @@ fn drop_if_unused(scene: &mut Scene) {
     }
     if scene.shading_normals.iter().all(|normal| *normal == Vec3::ZERO) {
         scene.shading_normals.clear();
+    }
+}
+
+/// Closes T-junctions and turns faces that disagree with their neighbours.
+fn repair_edges(faces: &mut [Face], vertices: &[DVec3], model: &mut Model, report: &mut ImportReport) {
+    let junctions = close_junctions(faces, vertices, &mut model.attributes);
+    report.junctions = junctions.closed;
+    report.open_junctions = junctions.left;
+    if junctions.left > 0 {
+        report.warn(format!(
+            "{} almost on a neighbour's edge and stay open: weld the edges in the modeller",
+            counted(junctions.left, "corner lies", "corners lie")
+        ));
+    }
+    // Of what has both sides either may be the front.
+    let stays = |face: &Face| {
+        model.materials[face.material as usize].emits() || model.two_sided.get(&face.material) == Some(&true)
+    };
+    let winding = orient(faces, vertices, stays);
+    report.turned_faces = winding.turned.len();
+    report.one_sided_surfaces = winding.one_sided;
+    for &face in &winding.turned {
+        model.attributes.turn_to_front(&mut faces[face as usize].corners, vertices);
+    }
+    if let Some(first) = winding.turned.iter().map(|&face| faces[face as usize].line).min() {
+        report.warn(format!(
+            "{} (the first in {} {first}) wound against the larger part of the surface around, turned: recalculate the \
+             normals in the modeller",
+            counted(winding.turned.len(), "face was", "faces were"),
+            model.place()
+        ));
+    }
+    if winding.one_sided > 0 {
+        report.warn(format!(
+            "{} wound in no consistent way, because one side leads to the other, and stay: give --two-sided if they look black",
+            counted(winding.one_sided, "surface is", "surfaces are")
+        ));
     }
 }
 
@@ -250,7 +327,6 @@ fn canonical(corners: &[Corner]) -> Vec<u32> {
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
-    use glam::DVec3;
     use proptest::prelude::*;
 
     use super::*;

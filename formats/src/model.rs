@@ -1,11 +1,11 @@
 //! A model: a file as it is written, on its way to a scene.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 
 use glam::{DMat3, DMat4, DVec3};
 use scene::{Material, NamedCamera, Texture, area_vector};
 
-use crate::attributes::{AttributeTable, Attributes};
+use crate::attributes::AttributeTable;
 use crate::face::{Corner, Face};
 
 /// Nothing welded, split or merged yet.
@@ -18,6 +18,8 @@ pub(crate) struct Model {
     /// What corners have beside positions; [`Corner::seam`] is an index into it.
     pub attributes: AttributeTable,
     pub materials: Vec<Material>,
+    /// By material, whether its faces have both sides, where a file says so; elsewhere they have the front.
+    pub two_sided: BTreeMap<u32, bool>,
     pub textures: Vec<Texture>,
     pub objects: Vec<String>,
     pub cameras: Vec<NamedCamera>,
@@ -55,6 +57,7 @@ impl Model {
             material.texture = material.texture.map(|texture| texture + textures);
             material
         }));
+        self.two_sided.extend(other.two_sided.into_iter().map(|(material, word)| (material + materials, word)));
         self.textures.extend(other.textures);
         self.objects.extend(other.objects);
         let unit = |direction: DVec3| transform.transform_vector3(direction);
@@ -75,32 +78,9 @@ impl Model {
         self.places = "face";
     }
 
-    /// Gives the faces of some materials backs, or takes away the backs that an importer gave them.
-    pub fn set_two_sided(&mut self, materials: &[u32], two_sided: bool) {
-        let is_back = |table: &AttributeTable, face: &Face| face.corners.iter().all(|c| table.get(c.seam).is_back);
-        let faces = std::mem::take(&mut self.faces);
-        let has_backs = faces.iter().any(|face| materials.contains(&face.material) && is_back(&self.attributes, face));
-        for face in faces {
-            let chosen = materials.contains(&face.material);
-            if chosen && !two_sided && is_back(&self.attributes, &face) {
-                continue;
-            }
-            let back = (chosen && two_sided && !has_backs).then(|| self.back_of(&face));
-            self.faces.push(face);
-            self.faces.extend(back);
-        }
-    }
-
-    /// The same face from the other side.
-    fn back_of(&mut self, face: &Face) -> Face {
-        let mut corners = face.corners.clone();
-        corners.reverse();
-        for corner in &mut corners {
-            let attributes = self.attributes.get(corner.seam);
-            let normal = attributes.normal.map(|normal| -normal);
-            corner.seam = self.attributes.intern(Attributes { normal, is_back: true, ..attributes });
-        }
-        Face { corners, ..*face }
+    /// What [`Face::line`] counts.
+    pub fn place(&self) -> &'static str {
+        if self.places.is_empty() { "line" } else { self.places }
     }
 
     /// Gives faces with a texture and without texture coordinates a material without the texture, of its mean colour.
@@ -116,7 +96,11 @@ impl Model {
                 material.texture = None;
                 material.reflectance *= mean;
                 self.materials.push(material);
-                self.materials.len() as u32 - 1
+                let id = self.materials.len() as u32 - 1;
+                if let Some(&word) = self.two_sided.get(&face.material) {
+                    self.two_sided.insert(id, word);
+                }
+                id
             });
         }
     }

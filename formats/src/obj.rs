@@ -96,7 +96,6 @@ fn attributes(mesh: &tobj::Mesh, corner: usize, textured: bool) -> Attributes {
     Attributes {
         uv: texture.filter(|_| textured).map(|&[u, v]: &[f64; 2]| DVec2::new(u, 1.0 - v).as_vec2()),
         normal: normal.map(|&normal: &[f64; 3]| DVec3::from_array(normal).normalize_or_zero().as_vec3()),
-        is_back: false,
     }
 }
 

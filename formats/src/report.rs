@@ -1,7 +1,9 @@
 //! What an import found and did.
 
+use serde::Serialize;
+
 /// Counts of what an import found and repaired, and a sentence for each thing that a user should know.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct ImportReport {
     /// Faces in the file.
     pub polygons_read: usize,
@@ -20,6 +22,16 @@ pub struct ImportReport {
     pub concave_faces: usize,
     /// By how many polygons the merging of triangles made the scene smaller.
     pub merged_faces: usize,
+    /// Corners inserted where a vertex of another face lies on an open edge.
+    pub junctions: usize,
+    /// Such corners that would have bent their polygon, and were left out.
+    pub open_junctions: usize,
+    /// Faces that were wound against the larger part of their surface: turned.
+    pub turned_faces: usize,
+    /// Surfaces that no turning makes consistent, like a Möbius strip: left as they are.
+    pub one_sided_surfaces: usize,
+    /// Polygons added as the other sides of ones that the file has.
+    pub other_sides: usize,
     /// Materials that faces use and no library defines: grey.
     pub missing_materials: usize,
     /// Materials whose reflectance was limited.

@@ -15,7 +15,7 @@
 //! [material.wall]             # every material of that name
 //! reflectance = [0.7, 0.7, 0.6]   # a number or red, green, blue; in place of a texture
 //! radiance = 0                # W/(sr m²)
-//! two_sided = false           # whether the backs of its faces are there, too
+//! two_sided = false           # whether the backs of its faces are there, too, whatever its model or --two-sided says
 //!
 //! [[camera]]                  # the first is the one that pictures are taken with
 //! name = "door"
@@ -259,7 +259,7 @@ fn change(scene: &mut Model, name: &str, entry: &MaterialEntry) -> Result<(), Wr
         material.radiance = radiance.unwrap_or(material.radiance);
     }
     if let Some(two_sided) = entry.two_sided {
-        scene.set_two_sided(&ids, two_sided);
+        scene.two_sided.extend(ids.iter().map(|&id| (id, two_sided)));
     }
     Ok(())
 }

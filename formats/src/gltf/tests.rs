@@ -6,7 +6,7 @@ use glam::{DVec3, Vec3};
 use proptest::prelude::*;
 use serde_json::{Value, json};
 
-use crate::{Imported, read_scene};
+use crate::{Imported, Sides, read_scene, read_scene_as};
 
 /// A file in a folder of its own, which goes with it.
 fn read_bytes(name: &str, bytes: &[u8]) -> Result<Imported, String> {
@@ -212,11 +212,53 @@ fn strips_fans_sparse_and_plain_vertices_and_what_is_no_surface() {
     assert!(sparse(u32::MAX).unwrap_err().contains("has no bytes"));
 }
 
+/// The same surface, whoever says that it has two sides: the file, a scene file over it, or who reads it.
 #[test]
-fn double_sided_materials_make_two_polygons() {
-    let Imported { scene, .. } = changed(|document| document["materials"][0]["doubleSided"] = json!(true)).unwrap();
-    assert_eq!(scene.polygons.len(), 2);
-    assert_eq!(scene::other_sides(&scene), [Some(1), Some(0)]);
+fn double_sided_scene_files_and_two_sided_readings_agree() {
+    let read = |double_sided: bool, word: Option<bool>, sides: Sides| {
+        let (mut document, binary) = square();
+        document["materials"][0]["doubleSided"] = json!(double_sided);
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("room.glb");
+        std::fs::write(&path, glb(&document, &binary)).unwrap();
+        let Some(word) = word else { return read_scene_as(&path, sides).unwrap() };
+        let path = folder.path().join("room.toml");
+        let text = format!("[[model]]\nfile = \"room.glb\"\n[material.paint]\ntwo_sided = {word}\n");
+        std::fs::write(&path, text).unwrap();
+        read_scene_as(&path, sides).unwrap()
+    };
+    for sides in [Sides::AsWound, Sides::Both] {
+        for double_sided in [false, true] {
+            for word in [None, Some(false), Some(true)] {
+                let Imported { scene, report } = read(double_sided, word, sides);
+                let two = word.unwrap_or(double_sided || sides == Sides::Both);
+                let found = (scene.polygons.len(), report.other_sides);
+                assert_eq!(found, if two { (2, 1) } else { (1, 0) }, "{double_sided} {word:?} {sides:?}");
+                assert_eq!(scene::other_sides(&scene), if two { vec![Some(1), Some(0)] } else { vec![None] });
+            }
+        }
+    }
+}
+
+#[test]
+fn triangles_of_a_two_sided_sheet_keep_their_normals_on_either_side() {
+    let (mut document, mut binary) = square();
+    document["materials"][0]["doubleSided"] = json!(true);
+    // Normals of a cushion, which bend over the square.
+    let bent: Vec<u8> = [(-0.5f32, -0.5f32), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)]
+        .into_iter()
+        .flat_map(|(x, y)| Vec3::new(x, y, 1.0).normalize().to_array())
+        .flat_map(f32::to_le_bytes)
+        .collect();
+    binary[48..96].copy_from_slice(&bent);
+    let scene = read(&document, &binary).unwrap().scene;
+    assert_eq!(scene.shading_normals.len(), scene.corners.len());
+    for polygon in scene.polygon_ids() {
+        let front = scene.plane(polygon).normal;
+        for corner in scene.polygons[polygon as usize].corner_range() {
+            assert!(scene.shading_normals[corner].as_dvec3().dot(front) > 0.5);
+        }
+    }
 }
 
 #[test]
