@@ -4,7 +4,7 @@ use std::io::Write;
 
 use anyhow::{Context, Result};
 use formats::{ImportReport, Imported};
-use scene::{Baked, Scene};
+use scene::{Baked, Scene, Texture};
 use serde::Serialize;
 
 use crate::args::InfoFlags;
@@ -53,6 +53,18 @@ struct SceneInfo {
     /// Corners of the box around it, metres.
     bounds: [[f64; 3]; 2],
     cameras: Vec<String>,
+    textures: Vec<TextureInfo>,
+}
+
+#[derive(Serialize)]
+struct TextureInfo {
+    name: String,
+    /// Texels; an image that was larger than a texture may be is here as it was reduced.
+    size: [u32; 2],
+    /// Mean linear colour.
+    mean: [f64; 3],
+    /// Materials that use it.
+    materials: Vec<String>,
 }
 
 /// What was found and repaired, and what reading took.
@@ -91,6 +103,19 @@ impl SceneInfo {
             power: scene.power().to_array(),
             bounds: [low.to_array(), high.to_array()],
             cameras: scene.cameras.iter().map(|camera| camera.name.clone()).collect(),
+            textures: (0..).zip(&scene.textures).map(|(id, texture)| TextureInfo::of(scene, id, texture)).collect(),
+        }
+    }
+}
+
+impl TextureInfo {
+    fn of(scene: &Scene, id: u32, texture: &Texture) -> Self {
+        let users = scene.materials.iter().filter(|material| material.texture == Some(id));
+        Self {
+            name: texture.name.clone(),
+            size: [texture.width, texture.height],
+            mean: texture.mean().to_array(),
+            materials: users.map(|material| material.name.clone()).collect(),
         }
     }
 }
@@ -113,8 +138,17 @@ impl BakeInfo {
 
 impl Info {
     fn text(&self) -> String {
-        let SceneInfo { polygons, vertices, materials, objects, emitters, power, bounds: [low, high], cameras } =
-            &self.scene;
+        let SceneInfo {
+            polygons,
+            vertices,
+            materials,
+            objects,
+            emitters,
+            power,
+            bounds: [low, high],
+            cameras,
+            textures,
+        } = &self.scene;
         let cameras = if cameras.is_empty() { "none".to_owned() } else { cameras.join(", ") };
         let mut text = format!(
             "scene            {polygons} polygons, {vertices} vertices, {materials} materials, {objects} objects\n\
@@ -125,6 +159,13 @@ impl Info {
             triple(high),
             triple(power)
         );
+        if !textures.is_empty() {
+            text += &format!("textures         {}\n", textures.len());
+        }
+        for TextureInfo { name, size: [width, height], mean, materials } in textures {
+            let materials = if materials.is_empty() { "no material".to_owned() } else { materials.join(", ") };
+            text += &format!("  {name:<20} {width}x{height}, mean {}, on {materials}\n", triple(mean));
+        }
         if let Some(import) = &self.import {
             text += &import.text();
         }
@@ -177,6 +218,8 @@ impl ImportInfo {
             (report.missing_materials, "materials missing, grey instead"),
             (report.clamped_materials, "reflectances limited"),
             (report.textured_materials, "textures not read"),
+            (report.mirror_materials, "mirrors and metals made diffuse"),
+            (report.transparent_faces, "faces left out, seen through for the most part"),
         ];
         let mut text = format!("import           {} faces in the file\n", report.polygons_read);
         for (count, what) in repairs.iter().filter(|(count, _)| *count > 0) {

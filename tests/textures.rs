@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use glam::{DVec3, Vec3};
 use scene::Camera;
+use serde_json::{Value, json};
 use viewer::{Frame, Mode, draw_on_cpu};
 
 use crate::fixture::{box_faces, folder, probe, run, text, write_points};
@@ -36,9 +37,9 @@ fn light_is_that_of_the_mean_and_pictures_show_the_texture() {
     let (textured, plain) = (folder(), folder());
     formats::write_png(&textured.path().join("halves.png"), 2, 1, &[[255; 3], [0; 3]]).unwrap();
     let scenes = [room(textured.path(), "Kd 0.8 0.8 0.8\nmap_Kd halves.png"), room(plain.path(), "Kd 0.4 0.4 0.4")];
-    let bakes = scenes.map(|scene| {
+    let bakes = scenes.each_ref().map(|scene| {
         let bake = scene.with_extension("hlf");
-        run(&["bake", text(&scene), "-o", text(&bake), "--tolerance", "0.03"]);
+        run(&["bake", text(scene), "-o", text(&bake), "--tolerance", "0.03"]);
         bake
     });
     let places = [(0.5, 0.5), (1.0, 2.5), (3.2, 0.4), (2.0, 1.5)];
@@ -48,6 +49,12 @@ fn light_is_that_of_the_mean_and_pictures_show_the_texture() {
     for (ours, exact) in ours.iter().zip(&exact) {
         assert!((*ours - *exact).length() <= 1e-6 * exact.length(), "{ours} {exact}");
     }
+
+    let info: Value = serde_json::from_slice(&run(&["info", text(&bakes[0]), "--json"]).stdout).unwrap();
+    let texture = &info["scene"]["textures"][0];
+    assert_eq!((&texture["size"], &texture["materials"]), (&json!([2, 1]), &json!(["floor"])));
+    let said = String::from_utf8(run(&["info", text(&scenes[0])]).stdout).unwrap();
+    assert!(said.contains("2x1, mean 0.5000 0.5000 0.5000, on floor"), "{said}");
 
     let baked = formats::read_baked(&bakes[0]).unwrap();
     let camera =
