@@ -55,11 +55,14 @@ pub enum Command {
 /// `halflight bake`.
 #[derive(Debug, Args)]
 pub struct BakeFlags {
-    /// Scene to bake (OBJ)
+    /// Scene to bake (.obj, .glb, .gltf, or a scene file .toml)
     pub scene: PathBuf,
     /// Where the bake goes
     #[arg(short, long, value_name = "OUT.hlf")]
     pub output: PathBuf,
+    /// How a scene is read
+    #[command(flatten)]
+    pub reading: SceneFlags,
     /// What the light is asked for
     #[command(flatten)]
     pub light: LightFlags,
@@ -69,6 +72,15 @@ pub struct BakeFlags {
     /// Print one JSON object on stdout: counts, seconds by stage, memory and measured error
     #[arg(long)]
     pub json: bool,
+}
+
+/// How a scene is read; a bake holds its scene as it was read then.
+#[derive(Clone, Copy, Debug, Default, Args)]
+pub struct SceneFlags {
+    /// Take faces as two-sided, where the scene's winding is not to be trusted: all but closed solids and rooms, and materials
+    /// of which a scene file says two_sided = false, get the other side that they lack
+    #[arg(long)]
+    pub two_sided: bool,
 }
 
 /// What a bake's light depends on; none means the default of the stage that it belongs to.
@@ -129,6 +141,9 @@ pub struct ShotFlags {
     /// Bake to draw, or a scene, which is baked first
     #[arg(value_name = "SCENE|OUT.hlf")]
     pub input: PathBuf,
+    /// How a scene is read
+    #[command(flatten)]
+    pub reading: SceneFlags,
     /// Where the picture goes; the name ends in .png (as displayed) or .exr (radiance, W/(sr m²))
     #[arg(short, long, value_name = "IMAGE", value_parser = image_path)]
     pub output: PathBuf,
@@ -186,6 +201,9 @@ pub struct ViewFlags {
     /// Bake to walk through, or a scene, which is baked first
     #[arg(value_name = "SCENE|OUT.hlf")]
     pub input: PathBuf,
+    /// How a scene is read
+    #[command(flatten)]
+    pub reading: SceneFlags,
     /// The first point of view
     #[command(flatten)]
     pub camera: CameraFlags,
@@ -197,6 +215,9 @@ pub struct ProbeFlags {
     /// Bake to probe, or a scene, which is baked first
     #[arg(value_name = "SCENE|OUT.hlf")]
     pub input: PathBuf,
+    /// How a scene is read
+    #[command(flatten)]
+    pub reading: SceneFlags,
     /// Points and normals: a CSV file with the header x,y,z,nx,ny,nz
     #[arg(long, value_name = "POINTS.csv")]
     pub points: PathBuf,
@@ -221,6 +242,9 @@ pub struct VerifyFlags {
     /// Bake to verify, or a scene, which is baked first
     #[arg(value_name = "SCENE|OUT.hlf")]
     pub input: PathBuf,
+    /// How a scene is read
+    #[command(flatten)]
+    pub reading: SceneFlags,
     /// Points compared, spread by area over all surfaces
     #[arg(long, value_name = "N", default_value_t = 2000, value_parser = clap::value_parser!(u32).range(100..=1_000_000), allow_negative_numbers = true)]
     pub points: u32,
@@ -257,6 +281,9 @@ pub struct InfoFlags {
     /// Bake or scene; a scene is described as it is, without a bake
     #[arg(value_name = "SCENE|OUT.hlf")]
     pub input: PathBuf,
+    /// How a scene is read
+    #[command(flatten)]
+    pub reading: SceneFlags,
     /// Print one JSON object on stdout
     #[arg(long)]
     pub json: bool,

@@ -3,6 +3,7 @@
 use std::time::Instant;
 
 use anyhow::Result;
+use formats::Imported;
 use scene::Baked;
 use serde::Serialize;
 
@@ -17,7 +18,7 @@ use crate::report::{peak_memory, print_json};
 /// Bakes a scene into a file.
 pub fn run(flags: &BakeFlags, outputs: &Outputs) -> Result<Outcome> {
     let output = outputs.claim(&flags.output)?;
-    let (scene, import_seconds) = read_scene(&flags.scene)?;
+    let (Imported { scene, .. }, import_seconds) = read_scene(&flags.scene, flags.reading)?;
     require_light(&flags.scene, &scene)?;
     let pipeline::Bake { baked, mut report, .. } = pipeline::bake(&scene, &flags.light, &flags.limits);
     let start = Instant::now();

@@ -92,7 +92,7 @@ mod tests {
             polygons: vec![polygon],
             materials: vec![Material::grey("grey")],
             objects: vec!["all".into()],
-            cameras: vec![],
+            ..Scene::default()
         };
         let point = |x: f64| SurfacePoint { position: DVec3::new(x, 0.5, 0.0), normal: DVec3::Z, polygon: 0 };
         let camera = |z: f64| Camera {

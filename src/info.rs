@@ -3,20 +3,26 @@
 use std::io::Write;
 
 use anyhow::{Context, Result};
-use scene::{Baked, Scene};
+use formats::{ImportReport, Imported};
+use scene::{Baked, Scene, Texture};
 use serde::Serialize;
 
 use crate::args::InfoFlags;
 use crate::failure::Outcome;
-use crate::input::Input;
+use crate::input::{no_bake, read_scene};
 use crate::pipeline::ErrorReport;
-use crate::report::print_json;
+use crate::report::{peak_memory, print_json};
 
 /// Describes a scene or a bake.
 pub fn run(flags: &InfoFlags) -> Result<Outcome> {
-    let info = match Input::read(&flags.input)? {
-        Input::Scene(scene) => Info { scene: SceneInfo::of(&scene), bake: None },
-        Input::Baked(baked) => Info { scene: SceneInfo::of(&baked.scene), bake: Some(BakeInfo::of(&baked)) },
+    let info = if formats::is_baked(&flags.input) {
+        no_bake(&flags.input, flags.reading)?;
+        let baked = formats::read_baked(&flags.input)?;
+        Info { scene: SceneInfo::of(&baked.scene), import: None, bake: Some(BakeInfo::of(&baked)) }
+    } else {
+        let (Imported { scene, report }, seconds) = read_scene(&flags.input, flags.reading)?;
+        let import = ImportInfo { report, seconds, peak_memory_bytes: peak_memory() };
+        Info { scene: SceneInfo::of(&scene), import: Some(import), bake: None }
     };
     if flags.json {
         print_json(&info)?;
@@ -29,6 +35,8 @@ pub fn run(flags: &InfoFlags) -> Result<Outcome> {
 #[derive(Serialize)]
 struct Info {
     scene: SceneInfo,
+    /// Null for a bake.
+    import: Option<ImportInfo>,
     /// Null for a scene.
     bake: Option<BakeInfo>,
 }
@@ -45,6 +53,28 @@ struct SceneInfo {
     /// Corners of the box around it, metres.
     bounds: [[f64; 3]; 2],
     cameras: Vec<String>,
+    textures: Vec<TextureInfo>,
+}
+
+#[derive(Serialize)]
+struct TextureInfo {
+    name: String,
+    /// Texels; an image that was larger than a texture may be is here as it was reduced.
+    size: [u32; 2],
+    /// Mean linear colour.
+    mean: [f64; 3],
+    /// Materials that use it.
+    materials: Vec<String>,
+}
+
+/// What was found and repaired, and what reading took.
+#[derive(Serialize)]
+struct ImportInfo {
+    #[serde(flatten)]
+    report: ImportReport,
+    seconds: f64,
+    /// Null where the system does not tell.
+    peak_memory_bytes: Option<u64>,
 }
 
 #[derive(Serialize)]
@@ -73,6 +103,19 @@ impl SceneInfo {
             power: scene.power().to_array(),
             bounds: [low.to_array(), high.to_array()],
             cameras: scene.cameras.iter().map(|camera| camera.name.clone()).collect(),
+            textures: (0..).zip(&scene.textures).map(|(id, texture)| TextureInfo::of(scene, id, texture)).collect(),
+        }
+    }
+}
+
+impl TextureInfo {
+    fn of(scene: &Scene, id: u32, texture: &Texture) -> Self {
+        let users = scene.materials.iter().filter(|material| material.texture == Some(id));
+        Self {
+            name: texture.name.clone(),
+            size: [texture.width, texture.height],
+            mean: texture.mean().to_array(),
+            materials: users.map(|material| material.name.clone()).collect(),
         }
     }
 }
@@ -95,8 +138,17 @@ impl BakeInfo {
 
 impl Info {
     fn text(&self) -> String {
-        let SceneInfo { polygons, vertices, materials, objects, emitters, power, bounds: [low, high], cameras } =
-            &self.scene;
+        let SceneInfo {
+            polygons,
+            vertices,
+            materials,
+            objects,
+            emitters,
+            power,
+            bounds: [low, high],
+            cameras,
+            textures,
+        } = &self.scene;
         let cameras = if cameras.is_empty() { "none".to_owned() } else { cameras.join(", ") };
         let mut text = format!(
             "scene            {polygons} polygons, {vertices} vertices, {materials} materials, {objects} objects\n\
@@ -107,6 +159,16 @@ impl Info {
             triple(high),
             triple(power)
         );
+        if !textures.is_empty() {
+            text += &format!("textures         {}\n", textures.len());
+        }
+        for TextureInfo { name, size: [width, height], mean, materials } in textures {
+            let materials = if materials.is_empty() { "no material".to_owned() } else { materials.join(", ") };
+            text += &format!("  {name:<20} {width}x{height}, mean {}, on {materials}\n", triple(mean));
+        }
+        if let Some(import) = &self.import {
+            text += &import.text();
+        }
         if let Some(bake) = &self.bake {
             text += &format!(
                 "bake             {} triangles, {} samples, {} elements, {} discontinuities\n\
@@ -131,6 +193,37 @@ impl Info {
             for (name, value) in &bake.statistics {
                 text += &format!("  {name:<20} {value}\n");
             }
+        }
+        text
+    }
+}
+
+impl ImportInfo {
+    /// A line for what was read, and one for each repair that something needed.
+    fn text(&self) -> String {
+        let report = &self.report;
+        let repairs = [
+            (report.welded_vertices, "repeated positions welded"),
+            (report.degenerate_faces, "faces without area skipped"),
+            (report.crossing_faces, "faces that cross themselves skipped"),
+            (report.repeated_faces, "repeated faces skipped"),
+            (report.non_planar_faces, "faces that are not planar split"),
+            (report.concave_faces, "concave faces split"),
+            (report.merged_faces, "faces merged into others"),
+            (report.junctions, "T-junctions closed"),
+            (report.open_junctions, "T-junctions left open"),
+            (report.turned_faces, "faces turned to agree with their surface"),
+            (report.one_sided_surfaces, "surfaces that no turning makes consistent"),
+            (report.other_sides, "other sides added"),
+            (report.missing_materials, "materials missing, grey instead"),
+            (report.clamped_materials, "reflectances limited"),
+            (report.textured_materials, "textures not read"),
+            (report.mirror_materials, "mirrors and metals made diffuse"),
+            (report.transparent_faces, "faces left out, seen through for the most part"),
+        ];
+        let mut text = format!("import           {} faces in the file\n", report.polygons_read);
+        for (count, what) in repairs.iter().filter(|(count, _)| *count > 0) {
+            text += &format!("  {count:<15}{what}\n");
         }
         text
     }

@@ -3,12 +3,14 @@
 use std::path::{Path, PathBuf};
 use std::time::UNIX_EPOCH;
 
-use anyhow::{Context, Result, ensure};
+use anyhow::{Context, Result, bail, ensure};
 use etcetera::BaseStrategy;
+use formats::{Imported, Sides};
 use scene::{Baked, Scene};
 
-use crate::args::{LightFlags, LimitFlags};
+use crate::args::{LightFlags, LimitFlags, SceneFlags};
 use crate::bake::missed;
+use crate::failure::Usage;
 use crate::output::Outputs;
 use crate::pipeline;
 use crate::progress::{Stage, say};
@@ -24,11 +26,12 @@ pub enum Input {
 
 impl Input {
     /// Reads a scene or a bake, whichever the file is.
-    pub fn read(path: &Path) -> Result<Self> {
+    pub fn read(path: &Path, flags: SceneFlags) -> Result<Self> {
         if formats::is_baked(path) {
+            no_bake(path, flags)?;
             Ok(Self::Baked(formats::read_baked(path)?))
         } else {
-            Ok(Self::Scene(read_scene(path)?.0))
+            Ok(Self::Scene(read_scene(path, flags)?.0.scene))
         }
     }
 
@@ -45,22 +48,33 @@ impl Input {
 }
 
 /// Reads a scene, passing on what the importer repaired; the seconds it took stand beside it.
-pub fn read_scene(path: &Path) -> Result<(Scene, f64)> {
+pub fn read_scene(path: &Path, flags: SceneFlags) -> Result<(Imported, f64)> {
     let stage = Stage::start("import");
-    let imported = formats::read_scene(path)?;
+    let imported = formats::read_scene_as(path, if flags.two_sided { Sides::Both } else { Sides::AsWound })?;
     let seconds = stage.end();
     for warning in &imported.report.warnings {
         say(format_args!("warning: {warning}"));
     }
-    Ok((imported.scene, seconds))
+    Ok((imported, seconds))
+}
+
+/// Refuses flags that say how a scene is read, where the file is a bake.
+pub fn no_bake(path: &Path, flags: SceneFlags) -> Result<()> {
+    if flags.two_sided {
+        let path = path.display();
+        bail!(Usage(format!(
+            "--two-sided says how a scene is read, and {path} is a bake; give it when the scene is baked"
+        )));
+    }
+    Ok(())
 }
 
 /// Refuses a scene that is dark.
 pub fn require_light(path: &Path, scene: &Scene) -> Result<()> {
     ensure!(
         scene.emitters().next().is_some(),
-        "{}: nothing emits light; give a material that its faces use an emitted radiance, such as the line \
-         `Ke 10 10 10` (W/(sr m²)) in the MTL file",
+        "{}: nothing emits light; give a material that its faces use an emitted radiance (W/(sr m²)), such as the line \
+         `Ke 10 10 10` in the MTL file, an emissive factor in a glTF file, or `radiance = 10` in a scene file",
         path.display()
     );
     Ok(())

@@ -12,7 +12,7 @@ use crate::shot::camera;
 /// Opens a window; returns when it is closed.
 pub fn run(flags: &ViewFlags, outputs: &Outputs) -> Result<Outcome> {
     let viewpoint = flags.camera.viewpoint()?;
-    let input = Input::read(&flags.input)?;
+    let input = Input::read(&flags.input, flags.reading)?;
     let baked = input.into_baked(&flags.input, &Default::default(), outputs)?;
     let camera = camera(&viewpoint, &baked.scene)?;
     viewer::open_window(&baked, camera, Mode::Shaded, None)

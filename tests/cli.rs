@@ -343,3 +343,46 @@ fn a_tolerance_that_is_out_of_reach() {
         assert!(fails(2, &arguments).contains(limit[0]));
     }
 }
+
+/// A room whose walls are inside out: `info` says so and names the cure, and with it they are lit.
+#[test]
+fn what_is_inside_out_is_said_and_two_sided_cures_it() {
+    let folder = folder();
+    let turned = |obj: String| {
+        let turn = |line: &str| match line.strip_prefix("f ") {
+            Some(corners) => format!("f {}", corners.split_whitespace().rev().collect::<Vec<_>>().join(" ")),
+            None => line.to_owned(),
+        };
+        obj.lines().map(turn).collect::<Vec<_>>().join("\n")
+    };
+    let obj = std::fs::read_to_string(data("scenes/cornell_box.obj")).unwrap();
+    std::fs::copy(data("scenes/cornell_box.mtl"), folder.path().join("cornell_box.mtl")).unwrap();
+    let path = folder.path().join("turned.obj");
+    std::fs::write(&path, turned(obj)).unwrap();
+    let doubts =
+        |said: &std::process::Output| String::from_utf8_lossy(&said.stderr).matches("the wrong way round").count();
+    let as_wound = run(&["info", text(&path), "--json"]);
+    assert!(doubts(&as_wound) >= 1, "{}", String::from_utf8_lossy(&as_wound.stderr));
+    let info: Value = serde_json::from_slice(&as_wound.stdout).unwrap();
+    assert_eq!((&info["import"]["polygons_read"], &info["import"]["other_sides"]), (&20.into(), &0.into()));
+    assert!(info["import"]["warnings"][0].as_str().unwrap().contains("--two-sided"));
+    let both = run(&["info", text(&path), "--two-sided"]);
+    assert_eq!(doubts(&both), 0, "{}", String::from_utf8_lossy(&both.stderr));
+    assert!(String::from_utf8(both.stdout).unwrap().contains("other sides added"));
+    // A scene file over it is read as it would be itself, but for what it says of a material.
+    let file = folder.path().join("turned.toml");
+    let added = |text_of_file: &str| {
+        std::fs::write(&file, text_of_file).unwrap();
+        let info: Value = serde_json::from_slice(&run(&["info", text(&file), "--two-sided", "--json"]).stdout).unwrap();
+        info["import"]["other_sides"].as_u64().unwrap()
+    };
+    let [all, but_red] = ["", "[material.red]\ntwo_sided = false\n"]
+        .map(|materials| added(&format!("[[model]]\nfile = \"turned.obj\"\n{materials}")));
+    assert!(all > 2 && but_red == all - 2, "{all} {but_red}");
+}
+
+#[test]
+fn two_sided_is_for_scenes() {
+    let said = fails(2, &["info", "--two-sided", text(cornell_box())]);
+    assert!(said.contains("--two-sided") && said.contains("is a bake"), "{said}");
+}

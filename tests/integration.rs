@@ -11,12 +11,17 @@ mod closed_forms;
 mod continuity;
 mod determinism;
 mod fixture;
+#[path = "../benches/common/generated/mod.rs"]
+mod generated;
+mod generated_scenes;
 mod golden;
 mod known_issues;
 mod leaks;
 mod licences;
 mod parity;
 mod readme;
+mod real_scenes;
 mod reference;
 mod robustness;
+mod textures;
 mod verify;

@@ -31,7 +31,9 @@ fn noise_is_neither_a_scene_nor_a_bake_nor_points() {
     for (seed, length) in [(1, 0), (2, 1), (3, 8), (4, 21), (5, 1000), (6, 100_000)] {
         let bytes = noise(seed, length);
         refused(&folder.path().join("noise.hlf"), &bytes);
-        refused(&folder.path().join("noise.obj"), &bytes);
+        for scene in ["noise.obj", "noise.glb", "noise.gltf", "noise.toml"] {
+            refused(&folder.path().join(scene), &bytes);
+        }
         let points = folder.path().join("noise.csv");
         std::fs::write(&points, &bytes).unwrap();
         let said = fails(1, &["probe", text(cornell_box()), "--points", text(&points)]);

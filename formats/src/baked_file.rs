@@ -6,7 +6,7 @@
 //! | 8..12 | version, u32 |
 //! | 12..16 | length of the header, u32 |
 //! | 16..20 | CRC-32 of bytes 0..16 and the header, u32 |
-//! | 20.. | header: what made the bake, its error, materials, objects, cameras and the table of sections, in bincode |
+//! | 20.. | header: what made the bake, its error, materials, textures' names and sizes, objects, cameras and the table of sections, in bincode |
 //! | then | the sections, one after another without gaps |
 //!
 //! Everything is little-endian. A section is an array of fixed-size rows: positions in metres, irradiance in W·m⁻²,
@@ -16,7 +16,7 @@ use std::fs;
 use std::io::Read;
 use std::path::Path;
 
-use scene::{Baked, BakedError, Material, NamedCamera, Provenance, Scene};
+use scene::{Baked, BakedError, Material, NamedCamera, Provenance, Scene, Texture};
 use serde::{Deserialize, Serialize};
 
 use crate::record::{Record, from_bytes, to_bytes};
@@ -25,7 +25,7 @@ use crate::{FormatError, write_atomically};
 const MAGIC: [u8; 8] = *b"\x89HLF\r\n\x1a\n";
 
 /// Raised with every change that an older program would misread.
-const VERSION: u32 = 2;
+const VERSION: u32 = 3;
 
 /// Bytes before the header.
 const PREAMBLE: usize = 20;
@@ -38,6 +38,8 @@ struct Header {
     provenance: Provenance,
     error: BakedError,
     materials: Vec<Material>,
+    /// Name, width and height of each; the texels are a section, one texture after another.
+    textures: Vec<(String, u32, u32)>,
     objects: Vec<String>,
     cameras: Vec<NamedCamera>,
     sections: Vec<Section>,
@@ -72,7 +74,11 @@ pub fn write_baked(path: &Path, baked: &Baked) -> Result<(), FormatError> {
     let arrays = [
         ("scene vertices", to_bytes(&scene.vertices)),
         ("scene corners", to_bytes(&scene.corners)),
+        ("texture coordinates", to_bytes(&scene.texture_coordinates)),
+        ("shading normals", to_bytes(&scene.shading_normals)),
         ("scene polygons", to_bytes(&scene.polygons)),
+        ("tints", to_bytes(&scene.tints)),
+        ("texels", scene.textures.iter().flat_map(|texture| texture.texels.as_flattened()).copied().collect()),
         ("vertices", to_bytes(&baked.vertices)),
         ("samples", to_bytes(&baked.samples)),
         ("triangles", to_bytes(&baked.triangles)),
@@ -91,6 +97,7 @@ pub fn write_baked(path: &Path, baked: &Baked) -> Result<(), FormatError> {
         provenance: baked.provenance.clone(),
         error: baked.error,
         materials: scene.materials.clone(),
+        textures: scene.textures.iter().map(|t| (t.name.clone(), t.width, t.height)).collect(),
         objects: scene.objects.clone(),
         cameras: scene.cameras.clone(),
         sections: sections.collect(),
@@ -164,12 +171,18 @@ pub fn read_baked(path: &Path) -> Result<Baked, FormatError> {
     }
 
     let sections = Sections { table: &header.sections, body, altered: &altered };
+    let textures = textures(header.textures, &sections.rows("texels")?)
+        .ok_or_else(|| altered("texels", "their number differs"))?;
     let baked = Baked {
         scene: Scene {
             vertices: sections.rows("scene vertices")?,
             corners: sections.rows("scene corners")?,
+            texture_coordinates: sections.rows("texture coordinates")?,
+            shading_normals: sections.rows("shading normals")?,
             polygons: sections.rows("scene polygons")?,
+            tints: sections.rows("tints")?,
             materials: header.materials,
+            textures,
             objects: header.objects,
             cameras: header.cameras,
         },
@@ -184,6 +197,16 @@ pub fn read_baked(path: &Path) -> Result<Baked, FormatError> {
     };
     baked.validate().map_err(|source| FormatError::Invalid { path: path.to_owned(), source })?;
     Ok(baked)
+}
+
+/// Textures of the given names and sizes, which take all of the texels; none where they do not.
+fn textures(sizes: Vec<(String, u32, u32)>, mut texels: &[[u8; 3]]) -> Option<Vec<Texture>> {
+    let mut textures = Vec::new();
+    for (name, width, height) in sizes {
+        let count = usize::try_from(u64::from(width) * u64::from(height)).ok()?;
+        textures.push(Texture { name, width, height, texels: texels.split_off(..count)?.to_vec() });
+    }
+    texels.is_empty().then_some(textures)
 }
 
 /// The checked sections of a file.
@@ -227,11 +250,16 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use std::path::PathBuf;
 
-    use glam::{DVec3, Vec3};
+    use glam::{DVec3, Vec2, Vec3};
     use proptest::prelude::*;
     use scene::{BakedElement, BakedTriangle, Camera, DiscontinuityLine, EdgeKind, LineKind, Polygon};
 
     use super::*;
+
+    fn texture(width: u32, height: u32) -> Texture {
+        let texels = (0..width * height).map(|i| [i as u8, width as u8, 200]).collect();
+        Texture { name: format!("{width} wide"), width, height, texels }
+    }
 
     /// A bake of one square with every kind of record in it.
     fn bake() -> Baked {
@@ -242,8 +270,12 @@ mod tests {
             scene: Scene {
                 vertices: corners.to_vec(),
                 corners: vec![0, 1, 2, 3],
+                texture_coordinates: vec![Vec2::ZERO, Vec2::X, Vec2::ONE, Vec2::Y],
+                shading_normals: vec![Vec3::Z, Vec3::ZERO, Vec3::Z, Vec3::Z],
                 polygons: vec![Polygon { first_corner: 0, corner_count: 4, material: 0, object: 0 }],
-                materials: vec![Material::grey("wall")],
+                tints: vec![DVec3::new(0.1, 0.2, 0.3)],
+                materials: vec![Material { texture: Some(1), ..Material::grey("wall") }],
+                textures: [1, 2].map(|width| texture(width, 3)).to_vec(),
                 objects: vec!["room".into()],
                 cameras: vec![NamedCamera {
                     name: "camera".into(),
@@ -360,8 +392,8 @@ mod tests {
         assert_eq!(read(&with(&|_| ())).unwrap(), bake());
         for (change, word) in [
             (&(|s: &mut Vec<Section>| s[1].offset -= 1) as &dyn Fn(&mut Vec<Section>), "overlap"),
-            (&|s| s[8].length = u64::MAX, "overflow"),
-            (&|s| s[8].length += 1 << 40, "cut off"),
+            (&|s| s[12].length = u64::MAX, "overflow"),
+            (&|s| s[12].length += 1 << 40, "cut off"),
             (&|s| s[0].name = "other".into(), "missing"),
             (&|s| drop(s.pop()), "behind the last section"),
             (&|s| s.clear(), "behind the last section"),

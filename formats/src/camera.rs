@@ -32,10 +32,11 @@ fn parse(words: &[&str]) -> Option<Camera> {
 
 /// A camera that frames a scene without one: in a closed room from near the corner with the freest view of the
 /// middle, else from outside, where most fronts are seen, with the whole scene in the picture.
-pub(crate) fn default_camera(scene: &Scene) -> NamedCamera {
+/// `up` is what the file says of it.
+pub(crate) fn default_camera(scene: &Scene, up: Option<DVec3>) -> NamedCamera {
     let (low, high) = scene.bounds();
     let centre = (low + high) / 2.0;
-    let up = up_of(scene);
+    let up = up.unwrap_or_else(|| up_of(scene));
     let bvh = Bvh::of_scene(scene);
     let eye = if is_room(&bvh, centre) {
         // Fractions of the box's extent: along `up` the height, across it one of the four corners.
@@ -134,7 +135,7 @@ mod tests {
     #[test]
     fn a_room_is_seen_from_inside_standing() {
         let scene = box_scene(true, None);
-        let camera = default_camera(&scene).camera;
+        let camera = default_camera(&scene, None).camera;
         assert!(camera.is_valid());
         assert_eq!(camera.up, DVec3::Z);
         let (low, high) = scene.bounds();
@@ -146,7 +147,7 @@ mod tests {
     fn a_block_and_an_open_box_are_seen_from_outside_in_full() {
         for (inwards, left_out) in [(false, None), (true, Some(5))] {
             let scene = box_scene(inwards, left_out);
-            let camera = default_camera(&scene).camera;
+            let camera = default_camera(&scene, None).camera;
             let (low, high) = scene.bounds();
             assert!(!(camera.eye.cmpge(low).all() && camera.eye.cmple(high).all()));
             let (right, up, forward) = camera.basis();

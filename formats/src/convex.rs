@@ -11,7 +11,7 @@ use crate::merge::{STRAIGHT, merge_triangles};
 
 /// Largest distance of a corner from its polygon's plane, as a fraction of the polygon's size: coordinates written
 /// with six digits pass, a quad that is visibly bent does not.
-const PLANARITY: f64 = 1e-5;
+pub(crate) const PLANARITY: f64 = 1e-5;
 
 /// Largest part of an outline's area that its triangles may miss or cover twice before it counts as crossing itself;
 /// far above rounding, and a crossing that small could not be seen.
@@ -128,7 +128,7 @@ fn rejoin(triangles: Vec<[u32; 3]>, outline: &[DVec3]) -> Vec<Vec<u32>> {
         object: 0,
         line: 0,
     });
-    let (pieces, _) = merge_triangles(faces.collect(), outline, PLANARITY);
+    let (pieces, _) = merge_triangles(faces.collect(), outline, PLANARITY, &|_| true);
     pieces.into_iter().map(|piece| piece.corners.into_iter().map(|corner| corner.vertex).collect()).collect()
 }
 

@@ -4,18 +4,23 @@
 //! that what is not convex or not planar is split, and that repeated vertices are welded: silhouettes are edges
 //! between neighbours, and without shared vertices every edge of a mesh would cast a shadow line of its own.
 
-use std::collections::HashSet;
+use std::collections::{BTreeMap, HashSet};
 use std::path::Path;
 
+use glam::{DVec3, Vec3};
 use scene::{Polygon, Scene};
 
 use crate::FormatError;
 use crate::camera::default_camera;
 use crate::convex::{Shape, shape_of};
 use crate::face::{Corner, Face, size};
+use crate::gltf::read_gltf;
 use crate::merge::{drop_straight_corners, merge_triangles};
-use crate::obj::{Model, read_obj};
+use crate::model::Model;
+use crate::obj::read_obj;
+use crate::repair::{add_other_sides, close_junctions, orient, warn_of_winding};
 use crate::report::{ImportReport, counted};
+use crate::scene_file::read_scene_file;
 use crate::weld::weld;
 
 /// Distance within which positions are one vertex, as a fraction of the scene's size: a few roundings of f32, in
@@ -35,32 +40,78 @@ pub struct Imported {
     pub report: ImportReport,
 }
 
-/// Reads a scene file, by its extension: today Wavefront OBJ with MTL.
+/// Which sides of a file's faces are surfaces.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Sides {
+    /// Fronts, where corners run counter-clockwise, and backs where the file says that a material has them.
+    #[default]
+    AsWound,
+    /// Both, where a file's winding is not to be trusted: every polygon gets its other side, of the same material, unless the
+    /// file has it, or says of the material that it has none, or the polygon is part of a closed solid or of a closed room
+    /// around a lamp or camera, wound consistently and with its fronts where they are seen from. A lamp then shines on both
+    /// sides.
+    Both,
+}
+
+/// Reads a scene file, its faces as they are wound: [`read_scene_as`].
 ///
-/// Lengths are taken as metres, `Kd` as reflectance, `Ke` as emitted radiance in W·sr⁻¹·m⁻²; fronts are where corners
-/// run counter-clockwise. Cameras stand in comments `# camera eye X Y Z dir X Y Z up X Y Z fov_deg D` (the full vertical
+/// # Errors
+/// Those of [`read_scene_as`].
+pub fn read_scene(path: &Path) -> Result<Imported, FormatError> {
+    read_scene_as(path, Sides::AsWound)
+}
+
+/// Reads a scene file, by its extension: Wavefront OBJ with MTL, glTF 2.0 (`.gltf`, `.glb`), or a scene file
+/// (`.toml`) that puts such models together.
+///
+/// Lengths are taken as metres, axes as the file has them; fronts are where corners run counter-clockwise. All surfaces are
+/// diffuse and opaque: what a file says of mirrors, metals and glass is taken by stated rules, which count in the report.
+///
+/// Of an OBJ, `Kd` is the reflectance, `Ke` the emitted radiance in W·sr⁻¹·m⁻², `map_Kd` a texture of the reflectance. A mirror
+/// (`illum` 3, 5, 8) or a metal (`Kd` black, `Ks` not) reflects `Kd` + `Ks` diffusely; `d` below 0.5 is left out.
+///
+/// Of a glTF file, the base colour is the reflectance (of metals, too), the emissive factor times its strength the emitted
+/// radiance, nits per channel taken as W·sr⁻¹·m⁻²; double-sided materials make two polygons, and what is translucent with a
+/// mean alpha below 0.5, or transmits half of the light, is left out. Cameras keep their names.
+///
+/// Light is computed with the mean colour of a texture over each polygon ([`Scene::reflectance`]).
+///
+/// Cameras of an OBJ stand in comments `# camera eye X Y Z dir X Y Z up X Y Z fov_deg D` (the full vertical
 /// angle) and are named camera, camera2 …; a file without one gets a camera named default that shows the whole scene.
 ///
 /// # Errors
 /// A file that cannot be read, is of another kind, has a line that is wrong (the error names it) or holds no polygon.
-pub fn read_scene(path: &Path) -> Result<Imported, FormatError> {
+pub fn read_scene_as(path: &Path, sides: Sides) -> Result<Imported, FormatError> {
     let extension = path.extension().map(|extension| extension.to_string_lossy().to_ascii_lowercase());
     let mut report = ImportReport::default();
     let model = match extension.as_deref() {
         Some("obj") => read_obj(path, &mut report)?,
-        _ => return Err(FormatError::content(path, "is no scene file that can be read", "give an .obj file")),
+        Some("gltf" | "glb") => read_gltf(path, &mut report)?,
+        Some("toml") => read_scene_file(path, &mut report)?,
+        _ => {
+            return Err(FormatError::content(
+                path,
+                "is no scene file that can be read",
+                "give an .obj file, a .gltf or .glb one, or a scene file (.toml)",
+            ));
+        }
     };
-    let scene = repair(path, model, &mut report)?;
+    // A camera that shows all of a scene stands outside of it, among backs: it says nothing of the winding.
+    let cameras = model.cameras.len();
+    let scene = repair(path, model, sides, &mut report)?;
+    warn_of_winding(&scene, cameras, &mut report);
     Ok(Imported { scene, report })
 }
 
 /// Welds, splits and merges until every face is a polygon of a scene.
-fn repair(path: &Path, model: Model, report: &mut ImportReport) -> Result<Scene, FormatError> {
+fn repair(path: &Path, mut model: Model, sides: Sides, report: &mut ImportReport) -> Result<Scene, FormatError> {
+    model.separate_untextured();
+    model.split_where_not_affine();
     let tolerance = WELD_DISTANCE * size(&model.positions);
     let (vertices, stands_for) = weld(&model.positions, tolerance);
     report.welded_vertices = model.positions.len() - vertices.len();
 
-    let mut faces = model.faces;
+    let mut faces = std::mem::take(&mut model.faces);
     for face in &mut faces {
         face.corners.iter_mut().for_each(|corner| corner.vertex = stands_for[corner.vertex as usize]);
         face.corners = without_spikes(&face.corners);
@@ -73,17 +124,25 @@ fn repair(path: &Path, model: Model, report: &mut ImportReport) -> Result<Scene,
         sorted.take(face, shape);
     }
     sorted.faces.sort_by_key(|face| face.line);
-    sorted.report(report);
+    sorted.report(model.place(), report);
     let count = sorted.faces.len();
-    let (mut faces, united) = merge_triangles(sorted.faces, &vertices, COPLANARITY);
+    let (mut faces, united) = merge_triangles(sorted.faces, &vertices, COPLANARITY, &|corners| {
+        model.attributes.are_affine(corners, &vertices)
+    });
     drop_straight_corners(&mut faces, &united, &vertices);
     report.merged_faces = count - faces.len();
+    repair_edges(&mut faces, &vertices, &mut model, report);
     if faces.is_empty() {
         return Err(FormatError::content(path, "has no face with an area", "check the scene in a modeller"));
     }
 
-    let mut scene =
-        Scene { materials: model.materials, objects: model.objects, cameras: model.cameras, ..Scene::default() };
+    let mut scene = Scene {
+        materials: model.materials,
+        textures: model.textures,
+        objects: model.objects,
+        cameras: model.cameras,
+        ..Scene::default()
+    };
     // Vertices that no polygon uses any more are left out; the others are numbered as polygons come to them.
     let mut new_ids = vec![None; vertices.len()];
     for face in faces {
@@ -99,13 +158,79 @@ fn repair(path: &Path, model: Model, report: &mut ImportReport) -> Result<Scene,
                 scene.vertices.len() as u32 - 1
             });
             scene.corners.push(id);
+            let attributes = model.attributes.get(corner.seam);
+            scene.texture_coordinates.push(attributes.uv.unwrap_or_default());
+            scene.shading_normals.push(attributes.normal.unwrap_or_default());
         }
     }
+    drop_if_unused(&mut scene);
+    scene.tints = scene.mean_texture_colours();
+    add_sides(&mut scene, sides, &model.two_sided, report);
     if scene.cameras.is_empty() {
-        scene.cameras.push(default_camera(&scene));
+        scene.cameras.push(default_camera(&scene, model.up));
     }
     scene.validate().map_err(|source| FormatError::Invalid { path: path.to_owned(), source })?;
     Ok(scene)
+}
+
+/// Gives polygons the other sides that their materials or `sides` ask for.
+fn add_sides(scene: &mut Scene, sides: Sides, said: &BTreeMap<u32, bool>, report: &mut ImportReport) {
+    let added = add_other_sides(scene, sides == Sides::Both, said);
+    report.other_sides = added.added;
+    if added.doubtful_lamps > 0 {
+        report.warn(format!(
+            "{} on both sides now, with twice the power; if that is not meant, close the lamps' cases in the modeller, or write \
+             two_sided = false for their material in a scene file",
+            counted(added.doubtful_lamps, "polygon emits", "polygons emit")
+        ));
+    }
+}
+
+/// Leaves out lists of texture coordinates and normals that say nothing.
+fn drop_if_unused(scene: &mut Scene) {
+    if !scene.polygon_ids().any(|polygon| scene.material(polygon).texture.is_some()) {
+        scene.texture_coordinates.clear();
+    }
+    if scene.shading_normals.iter().all(|normal| *normal == Vec3::ZERO) {
+        scene.shading_normals.clear();
+    }
+}
+
+/// Closes T-junctions and turns faces that disagree with their neighbours.
+fn repair_edges(faces: &mut [Face], vertices: &[DVec3], model: &mut Model, report: &mut ImportReport) {
+    let junctions = close_junctions(faces, vertices, &mut model.attributes);
+    report.junctions = junctions.closed;
+    report.open_junctions = junctions.left;
+    if junctions.left > 0 {
+        report.warn(format!(
+            "{} almost on a neighbour's edge and stay open: weld the edges in the modeller",
+            counted(junctions.left, "corner lies", "corners lie")
+        ));
+    }
+    // Of what has both sides either may be the front.
+    let stays = |face: &Face| {
+        model.materials[face.material as usize].emits() || model.two_sided.get(&face.material) == Some(&true)
+    };
+    let winding = orient(faces, vertices, stays);
+    report.turned_faces = winding.turned.len();
+    report.one_sided_surfaces = winding.one_sided;
+    for &face in &winding.turned {
+        model.attributes.turn_to_front(&mut faces[face as usize].corners, vertices);
+    }
+    if let Some(first) = winding.turned.iter().map(|&face| faces[face as usize].line).min() {
+        report.warn(format!(
+            "{} (the first in {} {first}) wound against the larger part of the surface around, turned: recalculate the \
+             normals in the modeller",
+            counted(winding.turned.len(), "face was", "faces were"),
+            model.place()
+        ));
+    }
+    if winding.one_sided > 0 {
+        report.warn(format!(
+            "{} wound in no consistent way, because one side leads to the other, and stay: give --two-sided if they look black",
+            counted(winding.one_sided, "surface is", "surfaces are")
+        ));
+    }
 }
 
 /// Faces that are polygons of a scene, and the lines of those that are not.
@@ -144,7 +269,7 @@ impl Sorted {
         }
     }
 
-    fn report(&self, report: &mut ImportReport) {
+    fn report(&self, place: &str, report: &mut ImportReport) {
         report.degenerate_faces = self.degenerate.len();
         report.crossing_faces = self.crossing.len();
         report.repeated_faces = self.repeated.len();
@@ -160,8 +285,8 @@ impl Sorted {
             ),
         ] {
             if let Some(first) = lines.first() {
-                report
-                    .warn(format!("{} (the first in line {first}) with {what}", counted(lines.len(), "face", "faces")));
+                let count = counted(lines.len(), "face", "faces");
+                report.warn(format!("{count} (the first in {place} {first}) with {what}"));
             }
         }
     }
@@ -202,7 +327,6 @@ fn canonical(corners: &[Corner]) -> Vec<u32> {
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
-    use glam::DVec3;
     use proptest::prelude::*;
 
     use super::*;
@@ -260,7 +384,7 @@ mod tests {
             let corners: Vec<_> = vertices.iter().map(|&vertex| Corner { vertex, seam: 0 }).collect();
             without_spikes(&corners).iter().map(|corner| corner.vertex).collect::<Vec<_>>()
         };
-        assert_eq!(tidy(&[]), []);
+        assert_eq!(tidy(&[]), Vec::<u32>::new());
         assert_eq!(tidy(&[1, 1]).len(), 1);
         assert!(tidy(&[1, 2, 1]).len() < 3);
         assert_eq!(tidy(&[1, 1, 2, 3, 3]), [1, 2, 3]);
@@ -305,10 +429,28 @@ mod tests {
     fn triangles_with_different_texture_coordinates_or_normals_at_their_edge_stay_apart() {
         let merged = |text: &str| read(format!("{SQUARE}{text}").as_bytes(), b"").unwrap().report.merged_faces;
         let normals = "vn 0 0 1\nvn 0 0.6 0.8\n";
-        assert_eq!(merged(&format!("{normals}f 1//1 2//2 3//1\nf 1//1 3//1 4//2\n")), 1);
+        assert_eq!(merged(&format!("{normals}f 1//2 2//2 3//1\nf 1//2 3//1 4//1\n")), 1);
+        assert_eq!(merged(&format!("{normals}f 1//1 2//2 3//1\nf 1//1 3//1 4//2\n")), 0, "a saddle");
         assert_eq!(merged(&format!("{normals}f 1//1 2//1 3//1\nf 1//2 3//2 4//2\n")), 0);
-        assert_eq!(merged("vt 0 0\nvt 1 0\nvt 0 0\nf 1/1 2/2 3/1\nf 1/3 3/3 4/2\n"), 1);
-        assert_eq!(merged("vt 0 0\nvt 1 0\nf 1/1 2/2 3/1\nf 1/1 3/2 4/2\n"), 0);
+        // Without a texture its coordinates mean nothing.
+        assert_eq!(merged("vt 0 0\nvt 1 0\nf 1/1 2/2 3/1\nf 1/1 3/2 4/2\n"), 1);
+        let png = image::RgbImage::from_pixel(1, 1, image::Rgb([90; 3]));
+        let folder = tempfile::tempdir().unwrap();
+        png.save(folder.path().join("a.png")).unwrap();
+        std::fs::write(folder.path().join("room.mtl"), "newmtl a\nmap_Kd -s 1 1 a.png\n").unwrap();
+        let textured = |text: &str| {
+            let path = folder.path().join("room.obj");
+            std::fs::write(&path, format!("mtllib room.mtl\nusemtl a\n{SQUARE}{text}")).unwrap();
+            let imported = read_scene(&path).unwrap();
+            assert_eq!(imported.scene.texture_coordinates.len(), imported.scene.corners.len());
+            imported.report.merged_faces
+        };
+        let corners = "vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n";
+        assert_eq!(textured(&format!("{corners}f 1/1 2/2 3/3\nf 1/1 3/3 4/4\n")), 1);
+        assert_eq!(textured(&format!("{corners}f 1/1 2/2 3/3\nf 1/1 3/3 4/3\n")), 0, "another map");
+        assert_eq!(textured(&format!("{corners}f 1/1 2/2 3/3\nf 1/2 3/3 4/4\n")), 0, "other corners");
+        // A quad over which the map is not affine is two triangles over which it is.
+        assert_eq!(textured(&format!("{corners}f 1/1 2/2 3/3 4/3\n")), 0);
     }
 
     #[test]
@@ -362,6 +504,19 @@ mod tests {
         assert_eq!(scene.cameras[0].name, "camera");
         assert!((scene.cameras[0].camera.vertical_fov.to_degrees() - 68.0).abs() < 1e-12);
         assert!(scene.emitters().count() >= 2);
+    }
+
+    #[test]
+    fn a_scene_file_over_the_office() {
+        let Imported { scene, report } = data("office_evening.toml");
+        let office = data("office.obj").scene;
+        assert_eq!((&scene.vertices, &scene.corners), (&office.vertices, &office.corners));
+        assert_eq!(report.warnings, Vec::<String>::new());
+        let material = |name: &str| scene.materials.iter().find(|material| material.name == name).unwrap();
+        assert_eq!(material("panel").radiance, DVec3::new(7.0, 5.5, 3.5));
+        assert_eq!(material("wall").reflectance, DVec3::new(0.62, 0.5, 0.42));
+        let names: Vec<_> = scene.cameras.iter().map(|named| named.name.as_str()).collect();
+        assert_eq!(names, ["desk", "camera"]);
     }
 
     /// The left wall is a warped quad in the published measurements (its lower corners lie at 0.5528 and 0.5496 m, its

@@ -4,26 +4,34 @@
 //! Every file is written under a temporary name and renamed, so that none is ever half there.
 
 mod atomic_file;
+mod attributes;
 mod baked_file;
 mod camera;
 mod convex;
 mod error;
 mod face;
+mod gltf;
+mod gltf_buffers;
+mod gltf_materials;
 mod image_file;
 mod import;
 mod material_library;
 mod merge;
+mod model;
 mod obj;
 mod obj_text;
 mod points_csv;
 mod record;
+mod repair;
 mod report;
+mod scene_file;
+mod texture_file;
 mod weld;
 
 pub use atomic_file::write_atomically;
 pub use baked_file::{is_baked, read_baked, write_baked};
 pub use error::FormatError;
 pub use image_file::{read_exr, read_png, write_exr, write_png};
-pub use import::{Imported, read_scene};
+pub use import::{Imported, Sides, read_scene, read_scene_as};
 pub use points_csv::{SurfaceQuery, read_points, write_irradiance};
 pub use report::ImportReport;

@@ -1,25 +1,41 @@
 //! Materials: what the MTL files beside an OBJ say of reflection and emission.
 
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 use std::fmt::Write;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use scene::{Material, Rgb};
+use scene::{Material, Rgb, Texture};
 
 use crate::FormatError;
 use crate::obj_text::{Named, number, whole_lines};
 use crate::report::{ImportReport, counted};
+use crate::texture_file::decode_texture;
 
 /// Largest reflectance that a scene is given. Nothing real reflects more (Spectralon 0.99), and a closed room that
 /// loses no light has no solution; at this value it still has one, after some thousand bounces.
-const LARGEST_REFLECTANCE: f64 = 0.999;
+pub(crate) const LARGEST_REFLECTANCE: f64 = 0.999;
+
+/// Opacity below which a surface is left out: what is seen through for the most part lets more light pass than it stops.
+pub(crate) const LEAST_OPACITY: f64 = 0.5;
+
+/// Illumination models of MTL that reflect as a mirror does.
+const MIRROR_MODELS: [u32; 3] = [3, 5, 8];
+
+/// Relative difference of Kd from a texture's mean within which it is that mean: rounding, and the loss of an image that
+/// was compressed again.
+const SAME_MEAN: f64 = 0.1;
 
 /// The materials of a scene, in the order of the files, and the index of each name.
 #[derive(Debug, Default)]
 pub(crate) struct Materials {
     pub list: Vec<Material>,
     pub index: HashMap<String, usize>,
+    pub textures: Vec<Texture>,
+    /// Places in the list whose faces are left out, because they are seen through.
+    pub left_out: BTreeSet<usize>,
+    /// Texture files that were read, or not.
+    texture_files: HashMap<PathBuf, Option<u32>>,
 }
 
 impl Materials {
@@ -28,13 +44,45 @@ impl Materials {
         self.index.entry(material.name.clone()).or_insert(self.list.len());
         self.list.push(material);
     }
+
+    /// The index of the texture in a file that a library names; none where it cannot be read.
+    fn texture(&mut self, library: &Path, file: &str, report: &mut ImportReport) -> Option<u32> {
+        // Files from Windows have backslashes in their paths.
+        let path = library.parent().unwrap_or(Path::new("")).join(file.replace('\\', "/"));
+        if let Some(known) = self.texture_files.get(&path) {
+            return *known;
+        }
+        let bytes = fs::read(&path).map_err(|error| error.to_string());
+        let texture = match bytes.and_then(|bytes| decode_texture(file, &bytes)) {
+            Ok(decoded) => {
+                self.textures.push(decoded.texture);
+                Some(self.textures.len() as u32 - 1)
+            }
+            Err(cause) => {
+                report
+                    .warn(format!("{}: the texture cannot be read: {cause}; give a PNG or JPEG file", path.display()));
+                None
+            }
+        };
+        self.texture_files.insert(path, texture);
+        texture
+    }
 }
 
 /// Reads the libraries that an OBJ names. A library that cannot be read, and a material that none defines, are
 /// counted and replaced by a grey; a library with a wrong line is an error.
 ///
 /// `Kd` is the reflectance, `Ke` the emitted radiance; a material without `Kd` gets the grey's reflectance, one
-/// without `Ke` emits nothing. Everything else in the file is passed over.
+/// without `Ke` emits nothing. What is no diffuse reflection is taken as follows, and counted:
+///
+/// - A mirror (`illum` 3, 5 or 8) and a metal (`Kd` black and `Ks` not) reflect diffusely what they reflect in all,
+///   `Kd` + `Ks`, limited to 0.999. Other highlights (`Ks`) are passed over.
+/// - What is seen through for the most part (`d` below 0.5, or `Tr` above) is left out, if it does not emit; other `d` are
+///   passed over.
+/// - `map_Kd` is the texture, its options are passed over. `Kd` multiplies it, unless it is black or the mean colour
+///   of the texture: programs write those for readers that know no textures.
+///
+/// Everything else in the file is passed over.
 pub(crate) fn read_materials(
     obj: &Path,
     libraries: &[Named],
@@ -98,21 +146,51 @@ fn read_library(
     let (library, _) = tobj::load_mtl_buf(&mut clean.text.as_bytes())
         .map_err(|error| FormatError::content(path, format!("is no MTL file ({error})"), "export the file again"))?;
     let grey = Material::grey("").reflectance;
-    let (mut without_kd, mut too_bright) = (Vec::new(), Vec::new());
+    let (mut without_kd, mut too_bright, mut mirrors) = (Vec::new(), Vec::new(), Vec::new());
+    let mut unread = clean.textured.clone();
     for material in library {
         let mut reflectance = material.diffuse.map_or(grey, Rgb::from_array);
         if material.diffuse.is_none() {
             without_kd.push(material.name.clone());
         }
-        if reflectance.max_element() > LARGEST_REFLECTANCE {
-            reflectance = reflectance.min(Rgb::splat(LARGEST_REFLECTANCE));
-            too_bright.push(material.name.clone());
-        }
         let radiance = material.emissive.map_or(Rgb::ZERO, Rgb::from_array);
-        materials.add(Material { name: material.name, reflectance, radiance });
+        let other = clean.other.get(&material.name).cloned().unwrap_or_default();
+        let is_metal = material.diffuse.is_some() && reflectance == Rgb::ZERO && radiance == Rgb::ZERO;
+        let is_left_out = other.opacity.is_some_and(|opacity| opacity < LEAST_OPACITY) && radiance == Rgb::ZERO;
+        let mut texture = None;
+        if let Some(file) = &other.texture {
+            texture = materials.texture(path, file, report);
+            match texture.and_then(|texture| materials.textures.get(texture as usize)) {
+                Some(read) => reflectance = multiplier(reflectance, read.mean()),
+                None => {
+                    unread.push(material.name.clone());
+                    if reflectance == Rgb::ZERO {
+                        reflectance = grey;
+                    }
+                }
+            }
+        } else if other.is_mirror || is_metal && other.specular != Rgb::ZERO {
+            reflectance += other.specular;
+            if !is_left_out {
+                mirrors.push(material.name.clone());
+            }
+            reflectance = reflectance.min(Rgb::splat(LARGEST_REFLECTANCE));
+        }
+        if reflectance.max_element() > LARGEST_REFLECTANCE {
+            // What multiplies a texture is often white.
+            if texture.is_none() || reflectance.max_element() > 1.0 {
+                too_bright.push(material.name.clone());
+            }
+            reflectance = reflectance.min(Rgb::splat(LARGEST_REFLECTANCE));
+        }
+        if is_left_out {
+            materials.left_out.insert(materials.list.len());
+        }
+        materials.add(Material { name: material.name, reflectance, texture, radiance });
     }
     report.clamped_materials += too_bright.len();
-    report.textured_materials += clean.textured.len();
+    report.textured_materials += unread.len();
+    report.mirror_materials += mirrors.len();
     let mut warn = |names: &[String], what: &str| {
         if let Some(first) = names.first() {
             let count = counted(names.len(), "material", "materials");
@@ -124,7 +202,8 @@ fn read_library(
         &too_bright,
         "reflect more than any surface does and were limited to 0.999; write Kd as a reflectance between 0 and 1",
     );
-    warn(&clean.textured, "have a texture, which is not read; set Kd to the mean colour of it");
+    warn(&unread, "have a texture that is not read; Kd and Ke stand for it: set them to its mean colour");
+    warn(&mirrors, "are mirrors or metals and were made diffuse, of reflectance Kd + Ks: nothing else can be baked");
     Ok(())
 }
 
@@ -134,12 +213,24 @@ struct MtlText {
     text: String,
     /// Materials whose reflectance or emission is textured.
     textured: Vec<String>,
+    /// What else matters of a material, by its name.
+    other: HashMap<String, OtherValues>,
+}
+
+/// What tobj is not asked for.
+#[derive(Clone, Default)]
+struct OtherValues {
+    specular: Rgb,
+    opacity: Option<f64>,
+    is_mirror: bool,
+    /// The file of map_Kd.
+    texture: Option<String>,
 }
 
 /// Checks an MTL text: tobj panics on a colour of fewer than three numbers, and refuses a whole library for a wrong
 /// shininess that nothing here looks at.
 fn check(path: &Path, text: &str) -> Result<MtlText, FormatError> {
-    let mut checked = MtlText { text: String::new(), textured: Vec::new() };
+    let mut checked = MtlText { text: String::new(), textured: Vec::new(), other: HashMap::new() };
     let mut current: Option<String> = None;
     for (line_number, line) in whole_lines(text) {
         let wrong = |(cause, cure)| FormatError::line(path, line_number, cause, cure);
@@ -156,7 +247,26 @@ fn check(path: &Path, text: &str) -> Result<MtlText, FormatError> {
                 let [r, g, b] = colour(rest).map_err(wrong)?;
                 writeln!(checked.text, "{keyword} {r:?} {g:?} {b:?}")
             }
-            ("map_Kd" | "map_Ke", Some(name)) => {
+            ("Ks", Some(name)) => {
+                // What is no colour here is passed over, as is what is wrong with other values that are not baked.
+                checked.other(name).specular = colour(rest).map_or(Rgb::ZERO, Rgb::from_array);
+                Ok(())
+            }
+            ("d" | "Tr", Some(name)) => {
+                if let Some(value) = rest.split_whitespace().last().and_then(|word| word.parse::<f64>().ok()) {
+                    checked.other(name).opacity = Some(if keyword == "d" { value } else { 1.0 - value });
+                }
+                Ok(())
+            }
+            ("illum", Some(name)) => {
+                checked.other(name).is_mirror = rest.parse().is_ok_and(|model| MIRROR_MODELS.contains(&model));
+                Ok(())
+            }
+            ("map_Kd", Some(name)) => {
+                checked.other(name).texture = Some(without_options(rest).to_owned());
+                Ok(())
+            }
+            ("map_Ke", Some(name)) => {
                 if checked.textured.last() != Some(name) {
                     checked.textured.push(name.clone());
                 }
@@ -170,6 +280,40 @@ fn check(path: &Path, text: &str) -> Result<MtlText, FormatError> {
         written.expect("writing to a string does not fail");
     }
     Ok(checked)
+}
+
+impl MtlText {
+    fn other(&mut self, name: &str) -> &mut OtherValues {
+        self.other.entry(name.to_owned()).or_default()
+    }
+}
+
+/// The file that a map names, behind its options (`-s 2 2 1`, `-clamp on`).
+fn without_options(rest: &str) -> &str {
+    let mut rest = rest;
+    while let Some((option, behind)) = rest.split_once(char::is_whitespace).filter(|(word, _)| word.starts_with('-')) {
+        rest = behind.trim_start();
+        let most = match option {
+            "-s" | "-o" | "-t" => 3,
+            "-mm" => 2,
+            _ => 1,
+        };
+        for value in 0..most {
+            let Some((word, behind)) = rest.split_once(char::is_whitespace) else { break };
+            // One to three numbers may stand behind an option that takes numbers.
+            if most > 1 && value > 0 && word.parse::<f64>().is_err() {
+                break;
+            }
+            rest = behind.trim_start();
+        }
+    }
+    rest
+}
+
+/// What multiplies a texture of a mean colour where the file says Kd beside it.
+fn multiplier(kd: Rgb, mean: Rgb) -> Rgb {
+    let is_mean = (kd - mean).abs().max_element() <= SAME_MEAN * mean.max_element();
+    if kd == Rgb::ZERO || is_mean { Rgb::ONE } else { kd }
 }
 
 /// Three numbers that are not negative, or one that stands for all.

@@ -5,7 +5,7 @@
 //! triangulation of simple polygons", 1983, who take the diagonals in any order).
 
 use glam::DVec3;
-use scene::{Plane, is_convex};
+use scene::{Plane, area_vector, is_convex};
 
 use crate::face::{Corner, Face, outline, size};
 
@@ -25,9 +25,19 @@ struct SharedEdge {
 /// `flatness` × its size of one plane. Faces of more corners stay as the file has them. A union stands at the place
 /// of its first part.
 ///
+/// Only what `agrees` with the outline of a union is made.
+///
 /// Returns the faces and, beside each, whether it is a union.
-pub(crate) fn merge_triangles(faces: Vec<Face>, vertices: &[DVec3], flatness: f64) -> (Vec<Face>, Vec<bool>) {
+pub(crate) fn merge_triangles(
+    faces: Vec<Face>,
+    vertices: &[DVec3],
+    flatness: f64,
+    agrees: &dyn Fn(&[Corner]) -> bool,
+) -> (Vec<Face>, Vec<bool>) {
     let mut edges = shared_edges(&faces, vertices);
+    // Of triangles and their unions; no other face has a shared edge.
+    let area = |face: &Face| if face.corners.len() == 3 { area_vector(&face.outline(vertices)) } else { DVec3::ZERO };
+    let mut areas: Vec<DVec3> = faces.iter().map(area).collect();
     let mut faces: Vec<Option<Face>> = faces.into_iter().map(Some).collect();
     let mut united = vec![false; faces.len()];
     let mut part_of: Vec<usize> = (0..faces.len()).collect();
@@ -40,12 +50,15 @@ pub(crate) fn merge_triangles(faces: Vec<Face>, vertices: &[DVec3], flatness: f6
             if p == q {
                 return false;
             }
-            let Some(corners) = unite(&first.corners, &second.corners, edge.ends, vertices, flatness) else {
+            let normal = (areas[p] + areas[q]).normalize_or_zero();
+            let union = unite([&first.corners, &second.corners], edge.ends, normal, vertices, flatness);
+            let Some(corners) = union.filter(|corners| agrees(corners)) else {
                 return true;
             };
             let (keep, drop) = (p.min(q), p.max(q));
             faces[drop] = None;
             part_of[drop] = keep;
+            areas[keep] = areas[p] + areas[q];
             united[keep] = true;
             if let Some(face) = &mut faces[keep] {
                 face.corners = corners;
@@ -89,9 +102,15 @@ fn whole(part_of: &mut [usize], mut face: usize) -> usize {
     face
 }
 
-/// The union of two convex outlines across the chain of edges that they share around `from`→`to` (in the direction of
-/// `p`), or none if it is not convex and flat. Corners inside the chain vanish: nothing outside can end at them.
-fn unite(p: &[Corner], q: &[Corner], [from, to]: [Corner; 2], at: &[DVec3], flatness: f64) -> Option<Vec<Corner>> {
+/// The union of two convex outlines p and q across the chain of edges that they share around `from`→`to` (in the direction
+/// of p), or none if it is not convex and flat; `normal` is the union's. Corners inside the chain vanish: nothing outside can end at them.
+fn unite(
+    [p, q]: [&[Corner]; 2],
+    [from, to]: [Corner; 2],
+    normal: DVec3,
+    at: &[DVec3],
+    flatness: f64,
+) -> Option<Vec<Corner>> {
     let (in_p, in_q) = (|i: usize| p[i % p.len()], |j: usize| q[j % q.len()]);
     // The chain runs from corner `first` to corner `last` of p, and from `start` to `end` of q.
     let mut first = (0..p.len()).find(|&i| in_p(i) == from && in_p(i + 1) == to)?;
@@ -109,6 +128,18 @@ fn unite(p: &[Corner], q: &[Corner], [from, to]: [Corner; 2], at: &[DVec3], flat
         end += 1;
     }
     let shared = last - first;
+    // Most unions that are not convex are so where the outlines meet, which is looked at before anything is copied.
+    let reflex = |corners: [Corner; 3]| {
+        let [before, here, after] = corners.map(|corner| at[corner.vertex as usize]);
+        let turn = (here - before).normalize_or_zero().cross((after - here).normalize_or_zero());
+        // Twice, so that the exact test below decides whatever is near.
+        turn.dot(normal) < -2.0 * STRAIGHT
+    };
+    if reflex([in_q(start + q.len() - 1), in_p(last), in_p(last + 1)])
+        || reflex([in_p(first + p.len() - 1), in_p(first), in_q(end + 1)])
+    {
+        return None;
+    }
     let union: Vec<Corner> =
         (last..=last + p.len() - shared).map(in_p).chain((end + 1..end + q.len() - shared).map(in_q)).collect();
     if union.len() < 3 {
@@ -149,7 +180,6 @@ pub(crate) fn drop_straight_corners(faces: &mut [Face], united: &[bool], vertice
 mod tests {
     #![allow(clippy::unwrap_used)]
     use proptest::prelude::*;
-    use scene::area_vector;
 
     use super::*;
 
@@ -179,7 +209,7 @@ mod tests {
     }
 
     fn merge(faces: Vec<Face>, vertices: &[DVec3]) -> Vec<Face> {
-        let (mut faces, united) = merge_triangles(faces, vertices, 1e-6);
+        let (mut faces, united) = merge_triangles(faces, vertices, 1e-6, &|_| true);
         drop_straight_corners(&mut faces, &united, vertices);
         faces
     }

@@ -4,26 +4,16 @@ use std::collections::HashMap;
 use std::fs;
 use std::path::Path;
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 use scene::{Material, NamedCamera};
 
 use crate::FormatError;
+use crate::attributes::Attributes;
 use crate::face::{Corner, Face};
 use crate::material_library::read_materials;
+use crate::model::Model;
 use crate::obj_text::{self, ObjText};
 use crate::report::{ImportReport, counted};
-
-/// A file as it is written: nothing welded, split or merged yet.
-#[derive(Debug, Default)]
-pub(crate) struct Model {
-    /// Positions, metres; each object has its own, and equal ones may repeat.
-    pub positions: Vec<DVec3>,
-    /// Faces in the order of the file.
-    pub faces: Vec<Face>,
-    pub materials: Vec<Material>,
-    pub objects: Vec<String>,
-    pub cameras: Vec<NamedCamera>,
-}
 
 /// Reads an OBJ file and the MTL files that it names.
 pub(crate) fn read_obj(path: &Path, report: &mut ImportReport) -> Result<Model, FormatError> {
@@ -46,8 +36,9 @@ pub(crate) fn read_obj(path: &Path, report: &mut ImportReport) -> Result<Model, 
     let (meshes, _) = tobj::load_obj_buf(&mut clean.as_bytes(), &tobj::LoadOptions::default(), |_| Ok(library.clone()))
         .map_err(|error| FormatError::content(path, format!("is no OBJ file ({error})"), "export the file again"))?;
 
-    let mut model = Model { materials: materials.list, cameras: named(&text), ..Model::default() };
-    let (mut objects, mut seams, mut unassigned) = (HashMap::new(), HashMap::new(), None);
+    let mut model =
+        Model { materials: materials.list, textures: materials.textures, cameras: named(&text), ..Model::default() };
+    let (mut objects, mut unassigned) = (HashMap::new(), None);
     let mut lines = text.face_lines.iter().copied();
     for tobj::Model { mesh, name } in meshes {
         // tobj leaves the list out where all faces are triangles.
@@ -71,27 +62,41 @@ pub(crate) fn read_obj(path: &Path, report: &mut ImportReport) -> Result<Model, 
         }) as u32;
         let first_vertex = model.positions.len() as u32;
         model.positions.extend(mesh.positions.as_chunks().0.iter().map(|&position| DVec3::from_array(position)));
-        let mut corners = (0..mesh.indices.len()).map(|i| {
-            let count = seams.len() as u32;
-            Corner { vertex: first_vertex + mesh.indices[i], seam: *seams.entry(attributes(&mesh, i)).or_insert(count) }
-        });
+        let textured = model.materials[material as usize].texture.is_some();
+        let mut first = 0;
         for (size, line) in sizes.into_iter().zip(&mut lines) {
-            model.faces.push(Face { corners: corners.by_ref().take(size).collect(), material, object, line });
+            let places = first..first + size;
+            first += size;
+            if materials.left_out.contains(&(material as usize)) {
+                report.transparent_faces += 1;
+                continue;
+            }
+            let vertices: Vec<u32> = mesh.indices[places.clone()].iter().map(|index| first_vertex + index).collect();
+            let outline: Vec<DVec3> = vertices.iter().map(|&vertex| model.positions[vertex as usize]).collect();
+            let mut attributes: Vec<_> = places.map(|corner| attributes(&mesh, corner, textured)).collect();
+            let seams = model.attributes.seams(&outline, &mut attributes);
+            let corners = vertices.into_iter().zip(seams).map(|(vertex, seam)| Corner { vertex, seam });
+            model.faces.push(Face { corners: corners.collect(), material, object, line });
         }
+    }
+    if report.transparent_faces > 0 {
+        report.warn(format!(
+            "{} left out: their materials are seen through for the most part (d below 0.5, or Tr above); write `d 1` in \
+             the MTL file to keep them",
+            counted(report.transparent_faces, "face was", "faces were"),
+        ));
     }
     Ok(model)
 }
 
-/// What a corner has beside its position, texture coordinate and shading normal, as bits that can be compared.
-fn attributes(mesh: &tobj::Mesh, corner: usize) -> [u64; 5] {
-    let mut bits = [0; 5];
-    let texture = mesh.texcoord_indices.get(corner).map(|&i| &mesh.texcoords[2 * i as usize..][..2]);
-    let normal = mesh.normal_indices.get(corner).map(|&i| &mesh.normals[3 * i as usize..][..3]);
-    let values = texture.unwrap_or(&[0.0; 2]).iter().chain(normal.unwrap_or(&[0.0; 3]));
-    for (bits, value) in bits.iter_mut().zip(values) {
-        *bits = value.to_bits();
+/// What a corner has beside its position. Texture coordinates matter where there is a texture; an OBJ counts v upwards.
+fn attributes(mesh: &tobj::Mesh, corner: usize, textured: bool) -> Attributes {
+    let texture = mesh.texcoord_indices.get(corner).and_then(|&i| mesh.texcoords.get(2 * i as usize..)?.first_chunk());
+    let normal = mesh.normal_indices.get(corner).and_then(|&i| mesh.normals.get(3 * i as usize..)?.first_chunk());
+    Attributes {
+        uv: texture.filter(|_| textured).map(|&[u, v]: &[f64; 2]| DVec2::new(u, 1.0 - v).as_vec2()),
+        normal: normal.map(|&normal: &[f64; 3]| DVec3::from_array(normal).normalize_or_zero().as_vec3()),
     }
-    bits
 }
 
 /// The cameras by name: camera, camera2, camera3 …

@@ -1,6 +1,6 @@
 //! Records: the fixed-size, little-endian rows that the arrays of a `.hlf` file consist of.
 
-use glam::{DVec3, Vec3};
+use glam::{DVec3, Vec2, Vec3};
 use scene::{BakedElement, BakedTriangle, DiscontinuityLine, EdgeKind, LineKind, Polygon};
 
 /// A value that takes the same number of bytes in every row.
@@ -45,6 +45,18 @@ impl<T: Record + Copy + Default, const N: usize> Record for [T; N] {
             *value = T::take(bytes)?;
         }
         Some(values)
+    }
+}
+
+impl Record for Vec2 {
+    const SIZE: usize = 8;
+
+    fn put(&self, bytes: &mut Vec<u8>) {
+        self.to_array().put(bytes);
+    }
+
+    fn take(bytes: &mut &[u8]) -> Option<Self> {
+        <[f32; 2]>::take(bytes).map(Self::from_array)
     }
 }
 

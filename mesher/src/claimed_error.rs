@@ -69,7 +69,7 @@ pub(crate) fn mean_reflectance(scene: &Scene, solution: &Solution) -> f64 {
         let Some(polygon) = solution.elements.polygon_of(leaf) else { continue };
         let irradiance = solution.irradiance[leaf as usize].irradiance * solution.elements.nodes[leaf as usize].area;
         arrives += colour_mean(irradiance);
-        leaves += colour_mean(irradiance * scene.material(polygon).reflectance);
+        leaves += colour_mean(irradiance * scene.reflectance(polygon));
     }
     if arrives > 0.0 { (leaves / arrives).min(LARGEST_REFLECTANCE) } else { 0.0 }
 }

@@ -310,7 +310,7 @@ impl Radiosity {
     fn of(scene: &Scene, solution: &Solution) -> Self {
         let node = |(node, light): (u32, &ElementLight)| {
             let polygon = solution.elements.polygon_of(node);
-            let reflectance = polygon.map_or(Rgb::ZERO, |polygon| scene.material(polygon).reflectance);
+            let reflectance = polygon.map_or(Rgb::ZERO, |polygon| scene.reflectance(polygon));
             [light.irradiance, light.gradient_u, light.gradient_v].map(|part| (reflectance * part).as_vec3())
         };
         Self((0..).zip(&solution.light).map(node).collect())

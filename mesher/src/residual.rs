@@ -85,7 +85,7 @@ pub(crate) fn residual(
         let leaf = &fine.leaves[fine.mesh.triangles[hit.id as usize].leaf as usize];
         let node = solution.elements.ancestors(leaf.element).find(|node| seen.contains(node));
         let known = node.map_or(Rgb::ZERO, |node| solution.light[node as usize].irradiance);
-        Some(scene.material(leaf.polygon).reflectance * (value(reflecting, hit.id as usize, hit.s, hit.t) - known))
+        Some(scene.reflectance(leaf.polygon) * (value(reflecting, hit.id as usize, hit.s, hit.t) - known))
     };
     points(fine)
         .into_par_iter()
@@ -160,7 +160,7 @@ fn misfits(scene: &Scene, solution: &Solution, fine: &FineMesh, reflecting: &[Rg
     }
     for (triangle, samples) in fine.table.triangles.iter().enumerate() {
         let leaf = &fine.leaves[fine.mesh.triangles[triangle].leaf as usize];
-        let reflectance = scene.material(leaf.polygon).reflectance;
+        let reflectance = scene.reflectance(leaf.polygon);
         let part = scene::area_vector(&fine.corners(triangle)).length() / samples.len() as f64;
         for &sample in samples {
             for node in elements.ancestors(leaf.element).filter(|&node| elements.patch_of(node).is_some()) {

@@ -2,7 +2,7 @@
 
 use glam::{DVec2, DVec3};
 use proptest::prelude::*;
-use scene::{Material, Polygon, Rgb, Scene};
+use scene::{Material, Polygon, Scene};
 
 use crate::{Leaf, LeafSegment};
 
@@ -15,11 +15,7 @@ pub(crate) struct Room {
 
 /// A scene of polygons given by their corners.
 pub(crate) fn scene_of(outlines: &[Vec<DVec3>]) -> Scene {
-    let mut scene = Scene {
-        materials: vec![Material { name: "grey".into(), reflectance: Rgb::splat(0.5), radiance: Rgb::ZERO }],
-        objects: vec!["room".into()],
-        ..Scene::default()
-    };
+    let mut scene = Scene { materials: vec![Material::grey("grey")], objects: vec!["room".into()], ..Scene::default() };
     for outline in outlines {
         let first_corner = scene.corners.len() as u32;
         for &corner in outline {

@@ -145,7 +145,7 @@ impl<'a> PathTracer<'a> {
             let [u, v, on_emitter @ ..] = numbers;
             let direction = cosine_direction(receiver.normal, [u, v]);
             let Some(point) = self.surfaces.seen_from(&receiver, direction) else { break };
-            throughput *= self.surfaces.scene.material(point.polygon).reflectance;
+            throughput *= self.surfaces.scene.reflectance(point.polygon);
             receiver = point.into();
             if throughput.max_element() <= 0.0 {
                 break;
@@ -203,7 +203,7 @@ pub(crate) mod test_scenes {
     /// A grey material of reflectance ρ and exitance M, W·m⁻².
     pub(crate) fn grey(reflectance: f64, exitance: f64) -> Material {
         let radiance = Rgb::splat(exitance / std::f64::consts::PI);
-        Material { name: "grey".into(), reflectance: Rgb::splat(reflectance), radiance }
+        Material { reflectance: Rgb::splat(reflectance), radiance, ..Material::grey("grey") }
     }
 
     /// A material that neither reflects nor emits.

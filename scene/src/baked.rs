@@ -140,10 +140,12 @@ impl Baked {
         self.interpolant(triangle).evaluate(s, t)
     }
 
-    /// Radiance that leaves a triangle at (s, t): ρE/π + Ke, W·sr⁻¹·m⁻².
+    /// Radiance that leaves a triangle at (s, t): ρE/π + Ke, W·sr⁻¹·m⁻², where ρ is the polygon's: a texture counts with its
+    /// mean.
     pub fn radiance(&self, triangle: u32, s: f64, t: f64) -> Rgb {
-        let material = self.scene.material(self.triangles[triangle as usize].polygon);
-        self.irradiance(triangle, s, t) * material.reflectance / std::f64::consts::PI + material.radiance
+        let polygon = self.triangles[triangle as usize].polygon;
+        self.irradiance(triangle, s, t) * self.scene.reflectance(polygon) / std::f64::consts::PI
+            + self.scene.material(polygon).radiance
     }
 
     /// The hierarchy over the triangles; a hit's id is the triangle.

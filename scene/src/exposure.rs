@@ -41,6 +41,12 @@ pub fn tone_curve(linear: f32) -> f32 {
     if linear <= SHOULDER { linear.max(0.0) } else { SHOULDER + room * (1.0 - (-(linear - SHOULDER) / room).exp()) }
 }
 
+/// An 8-bit sRGB value as a linear one, 0..=1: the inverse of [`encode_srgb`].
+pub fn decode_srgb(encoded: u8) -> f32 {
+    let encoded = f32::from(encoded) / 255.0;
+    if encoded <= 0.04045 { encoded / 12.92 } else { ((encoded + 0.055) / 1.055).powf(2.4) }
+}
+
 /// The sRGB transfer function (IEC 61966-2-1), display-linear 0..=1 to encoded 0..=1.
 pub fn encode_srgb(linear: f32) -> f32 {
     if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 }

@@ -9,8 +9,10 @@ use crate::Rgb;
 pub struct Material {
     /// Name in the scene file.
     pub name: String,
-    /// Diffuse reflectance ρ (`Kd`), each channel in 0..=1.
+    /// Diffuse reflectance ρ (`Kd`), each channel in 0..=1; what the texture multiplies, where there is one.
     pub reflectance: Rgb,
+    /// Index into [`crate::Scene::textures`], if the reflectance differs from point to point.
+    pub texture: Option<u32>,
     /// Emitted radiance (`Ke`), W·sr⁻¹·m⁻², each channel ≥ 0; the exitance is π times it.
     pub radiance: Rgb,
 }
@@ -18,7 +20,7 @@ pub struct Material {
 impl Material {
     /// A grey that stands in where a file names a material it does not define.
     pub fn grey(name: impl Into<String>) -> Self {
-        Self { name: name.into(), reflectance: Rgb::splat(0.5), radiance: Rgb::ZERO }
+        Self { name: name.into(), reflectance: Rgb::splat(0.5), texture: None, radiance: Rgb::ZERO }
     }
 
     /// Whether any channel emits.

@@ -2,10 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use glam::DVec3;
+use glam::{DVec3, Vec2, Vec3};
 use serde::{Deserialize, Serialize};
 
-use crate::{Material, NamedCamera, Plane, Polygon, Rgb, area_vector};
+use crate::{Material, NamedCamera, Plane, Polygon, Rgb, Texture, area_vector};
 
 /// Largest coordinate accepted, metres. Beyond it f32 positions in a viewer would be off by more than a
 /// centimetre, and nobody models a room there on purpose: the units are wrong.
@@ -18,10 +18,20 @@ pub struct Scene {
     pub vertices: Vec<DVec3>,
     /// Vertex ids of all polygons' corners, one polygon after another.
     pub corners: Vec<u32>,
+    /// Texture coordinates (u, v) of the corners, beside [`Scene::corners`]; empty where no polygon has a texture.
+    pub texture_coordinates: Vec<Vec2>,
+    /// Shading normals of the corners, beside [`Scene::corners`]: unit vectors, or zero where the polygon's own normal
+    /// stands; empty where it stands everywhere.
+    pub shading_normals: Vec<Vec3>,
     /// The polygons.
     pub polygons: Vec<Polygon>,
+    /// By polygon, the mean linear colour of its texture over its area, each channel in 0..=1; empty where no polygon
+    /// has a texture. See [`Scene::mean_texture_colours`].
+    pub tints: Vec<Rgb>,
     /// What the polygons are made of.
     pub materials: Vec<Material>,
+    /// What materials multiply their reflectance by.
+    pub textures: Vec<Texture>,
     /// Names of the objects (groups) that polygons belong to.
     pub objects: Vec<String>,
     /// Cameras stored with the scene; the first is the default one.
@@ -78,6 +88,13 @@ impl Scene {
         &self.materials[self.polygons[polygon as usize].material as usize]
     }
 
+    /// The reflectance of a polygon, each channel in 0..=1: its material's times the mean colour of its texture. This is
+    /// what light is computed with; within the polygon a picture shows the texture.
+    pub fn reflectance(&self, polygon: u32) -> Rgb {
+        let tint = self.tints.get(polygon as usize).copied().unwrap_or(Rgb::ONE);
+        self.material(polygon).reflectance * tint
+    }
+
     /// Ids of all polygons.
     pub fn polygon_ids(&self) -> std::ops::Range<u32> {
         0..self.polygons.len() as u32
@@ -126,6 +143,7 @@ impl Scene {
                 return Err(SceneError::Number(format!("material {i} ({})", material.name)));
             }
         }
+        self.validate_textures()?;
         for (polygon, record) in (0..).zip(&self.polygons) {
             let end = u64::from(record.first_corner) + u64::from(record.corner_count);
             if end > self.corners.len() as u64
@@ -144,6 +162,39 @@ impl Scene {
             }
         }
         Ok(())
+    }
+    fn validate_textures(&self) -> Result<(), SceneError> {
+        if let Some(i) = self.textures.iter().position(|texture| !texture.is_valid()) {
+            return Err(SceneError::Index(format!("the size of texture {i}")));
+        }
+        let textures = self.textures.len();
+        let textured = |material: &Material| material.texture.is_some();
+        if let Some(i) = self.materials.iter().position(|m| m.texture.is_some_and(|id| id as usize >= textures)) {
+            return Err(SceneError::Index(format!("the texture of material {i}")));
+        }
+        let used =
+            self.polygons.iter().filter_map(|polygon| self.materials.get(polygon.material as usize)).any(textured);
+        for (what, length, wanted) in [
+            ("texture coordinates", self.texture_coordinates.len(), self.corners.len()),
+            ("shading normals", self.shading_normals.len(), self.corners.len()),
+            ("tints", self.tints.len(), self.polygons.len()),
+        ] {
+            let needed = used && what != "shading normals";
+            if length != wanted && (length > 0 || needed) {
+                return Err(SceneError::Index(format!("the list of {what}")));
+            }
+        }
+        if let Some(i) = self.texture_coordinates.iter().position(|uv| !uv.is_finite()) {
+            return Err(SceneError::Number(format!("texture coordinate {i}")));
+        }
+        if let Some(i) = self.shading_normals.iter().position(|n| !n.is_finite() || n.length() > 1.001) {
+            return Err(SceneError::Number(format!("shading normal {i}")));
+        }
+        let within = |tint: &Rgb| tint.is_finite() && tint.min_element() >= 0.0 && tint.max_element() <= 1.0;
+        match self.tints.iter().position(|tint| !within(tint)) {
+            Some(i) => Err(SceneError::Number(format!("tint {i}"))),
+            None => Ok(()),
+        }
     }
 }
 

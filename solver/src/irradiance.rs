@@ -120,7 +120,7 @@ impl<'a> Gather<'a> {
             let area = |root: NodeId| solution.elements.nodes[root as usize].area;
             let power = |root: NodeId| luminance(solution.light[root as usize].irradiance) * area(root);
             let total: f64 = solution.patch_roots(polygon).map(power).sum();
-            luminance(scene.material(polygon).reflectance) * total / scene.area(polygon)
+            luminance(scene.reflectance(polygon)) * total / scene.area(polygon)
         };
         let radiosity = scene.polygon_ids().map(radiosity).collect();
         let geometry = Geometry::new(scene);
@@ -204,7 +204,7 @@ impl<'a> Gather<'a> {
             return rays.misplaced(solution, node);
         }
         let polygon = solution.elements.polygon_of(node).unwrap_or_default();
-        let reflectance = luminance(self.scene.material(polygon).reflectance);
+        let reflectance = luminance(self.scene.reflectance(polygon));
         reflectance * solution.light[node as usize].deviation * form_factor
     }
 
@@ -369,7 +369,7 @@ impl<'a> Gather<'a> {
         seen.iter()
             .map(|seen| {
                 let polygon = self.solution.elements.polygon_of(seen.node).unwrap_or_default();
-                let reflectance = self.scene.material(polygon).reflectance;
+                let reflectance = self.scene.reflectance(polygon);
                 reflectance * self.solution.light[seen.node as usize].at(seen.offset) * seen.form_factor
             })
             .sum()

@@ -275,7 +275,9 @@ impl LeafGather<'_> {
         for source in &self.sources {
             let material = gather.scene.material(source.polygon);
             let emits = wanted != Light::Reflected && material.emits();
-            let reflects = wanted != Light::Emitted && gather.solution.reflects() && material.reflectance != Rgb::ZERO;
+            let reflects = wanted != Light::Emitted
+                && gather.solution.reflects()
+                && gather.scene.reflectance(source.polygon) != Rgb::ZERO;
             if !emits && !reflects {
                 continue;
             }

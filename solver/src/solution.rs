@@ -246,7 +246,7 @@ impl Solution {
         let Some(polygon) = self.elements.polygon_of(node) else { return Rgb::ZERO };
         let material = scene.material(polygon);
         let reflected =
-            if self.reflects() { material.reflectance * self.light[node as usize].irradiance } else { Rgb::ZERO };
+            if self.reflects() { scene.reflectance(polygon) * self.light[node as usize].irradiance } else { Rgb::ZERO };
         reflected + material.exitance()
     }
 

@@ -115,12 +115,12 @@ fn source_light(scene: &Scene, elements: &Elements, transport: &Transport) -> So
     let (radiosity, deviation) = (0..elements.nodes.len() as u32)
         .map(|node| {
             let Some(polygon) = elements.polygon_of(node) else { return (0.0, 0.0) };
-            let (material, light) = (scene.material(polygon), &transport.reflected[node as usize]);
-            let radiosity = material.reflectance * light.irradiance + material.exitance();
+            let (reflectance, light) = (scene.reflectance(polygon), &transport.reflected[node as usize]);
+            let radiosity = reflectance * light.irradiance + scene.material(polygon).exitance();
             // A source's own slope counts as variation, too: a link carries its mean.
             let size = elements.nodes[node as usize].cell_max - elements.nodes[node as usize].cell_min;
             let slope = luminance(light.gradient_u.abs() * size.x + light.gradient_v.abs() * size.y) / 2.0;
-            (luminance(radiosity), (light.deviation + slope) * luminance(material.reflectance))
+            (luminance(radiosity), (light.deviation + slope) * luminance(reflectance))
         })
         .unzip();
     SourceLight { radiosity, deviation }

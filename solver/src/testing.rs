@@ -15,6 +15,7 @@ impl Builder {
         self.scene.materials.push(Material {
             name: format!("m{}", self.scene.materials.len()),
             reflectance: Rgb::splat(reflectance),
+            texture: None,
             radiance: Rgb::splat(radiance),
         });
         self

@@ -38,8 +38,9 @@ pub fn transport(
 ) -> Transport {
     let nodes = elements.nodes.len();
     let materials: Vec<_> = (0..nodes as u32)
-        .map(|node| elements.polygon_of(node).map(|polygon| scene.material(polygon)))
-        .map(|material| material.map_or((Rgb::ZERO, Rgb::ZERO), |m| (m.reflectance, m.exitance())))
+        .map(|node| elements.polygon_of(node))
+        .map(|polygon| polygon.map(|polygon| (scene.reflectance(polygon), scene.material(polygon).exitance())))
+        .map(|material| material.unwrap_or((Rgb::ZERO, Rgb::ZERO)))
         .collect();
     let leaving = |light: &[ElementLight]| -> Vec<Rgb> {
         let pairs = light.iter().zip(&materials);

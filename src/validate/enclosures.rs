@@ -124,7 +124,7 @@ fn energy_balance() -> Vec<Case> {
     let furniture = [Rgb::new(0.2, 0.4, 0.8), Rgb::ZERO];
     let lit = Lit::solve(furnished(walls, ceiling, furniture));
     let (scene, solution) = (&lit.scene, &lit.solution);
-    let absorbed = |polygon: u32| Rgb::ONE - scene.material(polygon).reflectance;
+    let absorbed = |polygon: u32| Rgb::ONE - scene.reflectance(polygon);
     let of_leaf = |leaf: u32| {
         let polygon = solution.elements.polygon_of(leaf).unwrap_or_default();
         absorbed(polygon) * solution.irradiance[leaf as usize].irradiance * solution.elements.nodes[leaf as usize].area

@@ -164,7 +164,7 @@ mod tests {
     use super::*;
     use crate::{
         draw_on_cpu,
-        test_room::{camera, room},
+        test_room::{camera, room, textured_room},
     };
 
     /// An adapter; none, loudly, where there is none and HALFLIGHT_REQUIRE_GPU does not ask for one.
@@ -211,10 +211,9 @@ mod tests {
     #[test]
     fn gpu_and_cpu_draw_the_same_picture_in_every_mode() {
         let Some(gpu) = gpu() else { return };
-        let room = room();
         let outside = Camera { eye: DVec3::new(-1.5, -2.0, 5.0), ..camera() };
         let inside_a_wall = Camera { eye: DVec3::new(0.0, 1.0, 1.0), ..camera() };
-        for mode in Mode::ALL {
+        for (mode, room) in Mode::ALL.into_iter().flat_map(|mode| [(mode, room()), (mode, textured_room())]) {
             for camera in [camera(), outside, inside_a_wall] {
                 let frame = Frame { camera, ..frame(mode) };
                 let ours = draw_on_gpu(&gpu, &room, &frame).unwrap();

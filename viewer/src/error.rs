@@ -35,6 +35,14 @@ pub enum ViewerError {
         /// Longest side that the adapter can draw, pixels; its memory may end earlier.
         limit: u32,
     },
+    /// Textures that do not fit into the adapter's memory as one buffer.
+    #[error("the textures take {bytes} bytes and the adapter holds {limit}; draw on the CPU, or use smaller images")]
+    TexturesTooLarge {
+        /// Bytes that they take.
+        bytes: u64,
+        /// Bytes that fit.
+        limit: u64,
+    },
     /// A camera that looks nowhere.
     #[error("the camera is not valid: its numbers must be finite, up not parallel to the view, and the angle in 0..π")]
     InvalidCamera,

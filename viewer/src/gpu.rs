@@ -5,6 +5,7 @@ use wgpu::util::DeviceExt;
 use crate::{
     ViewerError,
     frame::Passes,
+    interpolant_pass::ModePipelines,
     records::{Corners, Records, TriangleRecord},
 };
 
@@ -101,15 +102,17 @@ pub(crate) struct ResidentBake {
     pub triangles: u32,
     /// Corner positions, three to a triangle.
     pub corners: wgpu::Buffer,
-    /// What the interpolant pass reads: triangles, elements, corners.
+    /// What the interpolant pass reads: triangles, elements, corners, textures.
     pub interpolants: wgpu::BindGroup,
+    /// The interpolant pass's pipelines, where the bake has textures.
+    pub textured: Option<ModePipelines>,
 }
 
 impl ResidentBake {
     /// Copies a bake's records to the adapter.
     ///
     /// # Errors
-    /// [`ViewerError::TooManyTriangles`] when they exceed one of the adapter's buffers, [`ViewerError::Driver`] when
+    /// [`ViewerError::TooManyTriangles`] and [`ViewerError::TexturesTooLarge`] when they exceed one of the adapter's buffers, [`ViewerError::Driver`] when
     /// its memory is full.
     pub fn upload(gpu: &Gpu, records: &Records) -> Result<Self, ViewerError> {
         let limits = gpu.device.limits();
@@ -118,6 +121,10 @@ impl ResidentBake {
         let triangles = records.triangles.len();
         if triangles as u64 > limit || size_of_val(&*records.elements) as u64 > largest {
             return Err(ViewerError::TooManyTriangles { triangles, limit });
+        }
+        let texture_bytes = size_of_val(&*records.textures) as u64;
+        if texture_bytes > largest {
+            return Err(ViewerError::TexturesTooLarge { bytes: texture_bytes, limit: largest });
         }
         guarded(&gpu.device, || {
             // A binding must not be empty; an empty bake has one record that nothing reads.
@@ -133,12 +140,12 @@ impl ResidentBake {
             let elements = storage("elements", bytemuck::cast_slice(&records.elements), 16, none);
             let corner_bytes = bytemuck::cast_slice(&records.corners);
             let corners = storage("corners", corner_bytes, size_of::<Corners>(), wgpu::BufferUsages::VERTEX);
-            let interpolants = bind_group(
-                &gpu.device,
-                &gpu.passes.interpolant.bake_layout,
-                &[records_.as_entire_binding(), elements.as_entire_binding(), corners.as_entire_binding()],
-            );
-            Self { triangles: triangles as u32, corners, interpolants }
+            let textures = storage("textures", bytemuck::cast_slice(&records.textures), 4, none);
+            let buffers = [&records_, &elements, &corners, &textures].map(wgpu::Buffer::as_entire_binding);
+            let pass = &gpu.passes.interpolant;
+            let interpolants = bind_group(&gpu.device, &pass.bake_layout, &buffers);
+            let textured = (!records.textures.is_empty()).then(|| pass.textured(&gpu.device));
+            Self { triangles: triangles as u32, corners, interpolants, textured }
         })
     }
 }

@@ -9,11 +9,16 @@ pub(crate) const SHADER: &str =
 /// Side of the square of pixels that a workgroup takes; the shader says the same.
 const WORKGROUP: u32 = 8;
 
-/// The pipelines of the pass, one a mode: a software adapter runs both sides of every branch that it cannot fold.
+/// One pipeline a mode.
+pub(crate) type ModePipelines = [wgpu::ComputePipeline; Mode::ALL.len()];
+
+/// The pass for bakes without textures, one pipeline a mode: a software adapter runs both sides of every branch that it cannot fold.
 pub(crate) struct InterpolantPass {
-    pipelines: [wgpu::ComputePipeline; Mode::ALL.len()],
+    pipelines: ModePipelines,
+    module: wgpu::ShaderModule,
+    pipeline_layout: wgpu::PipelineLayout,
     frame_layout: wgpu::BindGroupLayout,
-    /// Layout of what the pass reads of a bake: triangles, elements, corners.
+    /// Layout of what the pass reads of a bake: triangles, elements, corners, textures.
     pub bake_layout: wgpu::BindGroupLayout,
 }
 
@@ -54,26 +59,19 @@ impl InterpolantPass {
                 },
             ],
         );
-        let bake_layout = layout("bake", &[buffer(wgpu::BufferBindingType::Storage { read_only: true }); 3]);
+        let bake_layout = layout("bake", &[buffer(wgpu::BufferBindingType::Storage { read_only: true }); 4]);
         let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
             label: Some("interpolant"),
             bind_group_layouts: &[Some(&frame_layout), Some(&bake_layout)],
             immediate_size: 0,
         });
-        let pipelines = Mode::ALL.map(|mode| {
-            device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-                label: Some(mode.name()),
-                layout: Some(&pipeline_layout),
-                module: &module,
-                entry_point: Some("interpolate"),
-                compilation_options: wgpu::PipelineCompilationOptions {
-                    constants: &[("MODE", f64::from(mode as u8))],
-                    ..Default::default()
-                },
-                cache: None,
-            })
-        });
-        Self { pipelines, frame_layout, bake_layout }
+        let pipelines = pipelines(device, &module, &pipeline_layout, false);
+        Self { pipelines, module, pipeline_layout, frame_layout, bake_layout }
+    }
+
+    /// The pipelines for a bake with textures.
+    pub fn textured(&self, device: &wgpu::Device) -> ModePipelines {
+        pipelines(device, &self.module, &self.pipeline_layout, true)
     }
 
     /// What the pass reads and writes besides the bake.
@@ -93,11 +91,32 @@ impl InterpolantPass {
     pub fn encode(&self, encoder: &mut wgpu::CommandEncoder, targets: &Targets, bake: &ResidentBake, mode: Mode) {
         let mut pass = encoder
             .begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some("interpolant"), timestamp_writes: None });
-        pass.set_pipeline(&self.pipelines[mode as usize]);
+        pass.set_pipeline(&bake.textured.as_ref().unwrap_or(&self.pipelines)[mode as usize]);
         pass.set_bind_group(0, &targets.interpolant_inputs, &[]);
         pass.set_bind_group(1, &bake.interpolants, &[]);
         pass.dispatch_workgroups(targets.width.div_ceil(WORKGROUP), targets.height.div_ceil(WORKGROUP), 1);
     }
+}
+
+fn pipelines(
+    device: &wgpu::Device,
+    module: &wgpu::ShaderModule,
+    layout: &wgpu::PipelineLayout,
+    textured: bool,
+) -> ModePipelines {
+    Mode::ALL.map(|mode| {
+        device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+            label: Some(mode.name()),
+            layout: Some(layout),
+            module,
+            entry_point: Some("interpolate"),
+            compilation_options: wgpu::PipelineCompilationOptions {
+                constants: &[("MODE", f64::from(mode as u8)), ("TEXTURED", f64::from(u8::from(textured)))],
+                ..Default::default()
+            },
+            cache: None,
+        })
+    })
 }
 
 #[cfg(test)]

@@ -17,6 +17,7 @@ mod picture;
 mod records;
 #[cfg(test)]
 mod test_room;
+mod texture_records;
 mod tone_map_pass;
 mod twin;
 mod visibility_pass;

@@ -3,9 +3,11 @@
 use bytemuck::{Pod, Zeroable};
 use scene::{Baked, EdgeKind, Interpolant, LineKind, Rgb};
 
+use crate::texture_records::{TexturePlace, texture_words};
+
 /// One triangle as pass (c) reads it. The coefficients (A, 2B, 2C, D, 2E, F) of its interpolant are multiplied by ρ/π, so
 /// that the quadratic is reflected radiance at once and no material is looked up at a pixel; the clamp at 0
-/// commutes, because ρ ≥ 0. Laid out as WGSL does: a vec3 takes 16 bytes, whose last 4 hold a u32.
+/// commutes, because ρ ≥ 0. A texture multiplies it at the pixel. Laid out as WGSL does: a vec3 takes 16 bytes, whose last 4 hold a u32.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 pub(crate) struct TriangleRecord {
@@ -16,11 +18,14 @@ pub(crate) struct TriangleRecord {
     /// An [`edge_code`] for each of the edges 0→1, 1→2, 2→0, ten bits each from the lowest up.
     pub edges: u32,
     pub c2: [f32; 3],
-    pub padding_c: u32,
+    /// [`TexturePlace::texels`]; 0 for no texture.
+    pub texels: u32,
     pub d: [f32; 3],
-    pub padding_d: u32,
+    /// [`TexturePlace::size`].
+    pub texture_size: u32,
     pub e2: [f32; 3],
-    pub padding_e: u32,
+    /// [`TexturePlace::corners`].
+    pub texture_corners: u32,
     pub f: [f32; 3],
     pub padding_f: u32,
     /// Emitted radiance Ke, W·sr⁻¹·m⁻².
@@ -39,18 +44,25 @@ pub(crate) struct Records {
     pub corners: Vec<Corners>,
     /// Radiance of each leaf element by the solver's constant irradiance, W·sr⁻¹·m⁻²; the fourth number is padding.
     pub elements: Vec<[f32; 4]>,
+    /// Textures, as [`texture_words`] has them; empty where there are none.
+    pub textures: Vec<u32>,
 }
 
 impl Records {
     /// The arrays of a bake that validates.
     pub fn of(baked: &Baked) -> Self {
         let weights = WeightRange::of(baked);
+        let (textures, places) = texture_words(baked);
         let triangle = |id: u32| {
             let triangle = &baked.triangles[id as usize];
             let material = baked.scene.material(triangle.polygon);
+            let place = places.get(id as usize).copied().unwrap_or_default();
+            let is_textured = place != TexturePlace::default();
+            let reflectance =
+                if is_textured { material.reflectance } else { baked.scene.reflectance(triangle.polygon) };
             let Interpolant(coefficients) = baked.interpolant(id);
             let [a, b2, c2, d, e2, f] =
-                coefficients.map(|c| (c * material.reflectance / std::f64::consts::PI).as_vec3().to_array());
+                coefficients.map(|c| (c * reflectance / std::f64::consts::PI).as_vec3().to_array());
             let [e0, e1, e2_] = triangle.edges.map(|edge| edge_code(baked, edge, weights));
             TriangleRecord {
                 a,
@@ -60,6 +72,9 @@ impl Records {
                 e2,
                 f,
                 element: triangle.element,
+                texels: place.texels,
+                texture_size: place.size,
+                texture_corners: place.corners,
                 edges: e0 | e1 << 10 | e2_ << 20,
                 emitted: material.radiance.as_vec3().to_array(),
                 ..TriangleRecord::zeroed()
@@ -69,14 +84,23 @@ impl Records {
         let element = |element: &scene::BakedElement| {
             let material = baked.scene.material(element.polygon);
             let irradiance = element.irradiance.as_dvec3().max(Rgb::ZERO);
-            let radiance = irradiance * material.reflectance / std::f64::consts::PI + material.radiance;
+            let radiance =
+                irradiance * baked.scene.reflectance(element.polygon) / std::f64::consts::PI + material.radiance;
             radiance.as_vec3().extend(0.0).to_array()
         };
         Self {
             triangles: ids.clone().map(triangle).collect(),
             corners: ids.map(|id| baked.corners(id).map(|corner| corner.as_vec3().to_array())).collect(),
             elements: baked.elements.iter().map(element).collect(),
+            textures,
         }
+    }
+}
+
+impl TriangleRecord {
+    /// Where the triangle's texture lies in [`Records::textures`].
+    pub fn texture(&self) -> TexturePlace {
+        TexturePlace { texels: self.texels, size: self.texture_size, corners: self.texture_corners }
     }
 }
 
@@ -145,7 +169,7 @@ mod tests {
         let baked = room();
         for (id, record) in (0..).zip(&Records::of(&baked).triangles) {
             for (s, t) in [(0.0, 0.0), (1.0, 0.0), (0.25, 0.5)] {
-                let ours = crate::twin::interpolant(record, s, t);
+                let ours = crate::twin::interpolant(record, glam::Vec3::ONE, s, t);
                 let exact = baked.radiance(id, f64::from(s), f64::from(t));
                 assert!((ours.as_dvec3() - exact).length() <= 2e-6 * (1.0 + exact.length()), "{ours} {exact}");
             }

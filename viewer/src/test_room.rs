@@ -1,10 +1,10 @@
 //! What tests share: a synthetic bake, a closed room with a lamp whose light is made up but continuous; and the
 //! shader validator.
 
-use glam::{DVec3, Vec3};
+use glam::{DVec3, Vec2, Vec3};
 use scene::{
     Baked, BakedElement, BakedTriangle, Camera, DiscontinuityLine, EdgeKind, LineKind, Material, Polygon,
-    SAMPLE_BARYCENTRICS, Scene,
+    SAMPLE_BARYCENTRICS, Scene, Texture,
 };
 
 /// Elements along each side of a wall.
@@ -31,6 +31,23 @@ pub(crate) fn room() -> Baked {
         baked.lines.push(DiscontinuityLine { kind, receiver: 0, source: 1, blocker: 1, weight, ends });
     }
     baked.triangle_errors = vec![0.0; baked.triangles.len()];
+    baked.validate().expect("the room is a valid bake");
+    baked
+}
+
+/// The room with a texture of every colour on its floor, turned, and repeated a few times.
+pub(crate) fn textured_room() -> Baked {
+    let mut baked = room();
+    let scene = &mut baked.scene;
+    let (width, height) = (13, 7);
+    let texel = |i: u32| [(i * 37 % 256) as u8, (i * 91 % 256) as u8, (255 - i * 2 % 256) as u8];
+    let texels = (0..width * height).map(texel).collect();
+    scene.textures = vec![Texture { name: "confetti".into(), width, height, texels }];
+    scene.materials[1].texture = Some(0);
+    let corners = scene.corners.iter().map(|&corner| scene.vertices[corner as usize].as_vec3());
+    scene.texture_coordinates =
+        corners.map(|p| Vec2::new(0.9 * p.x + 0.4 * p.y - 7.0, 0.3 * p.y - 0.7 * p.x)).collect();
+    scene.tints = scene.mean_texture_colours();
     baked.validate().expect("the room is a valid bake");
     baked
 }

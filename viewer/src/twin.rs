@@ -11,6 +11,7 @@ use crate::{
     Frame, Mode, Picture,
     frame::{FrameUniform, NEAR},
     records::{Corners, Records, TriangleRecord},
+    texture_records::texture_colour,
 };
 
 /// Rows and columns of the grid that the light of a picture is metered on: enough that a lamp or a dark doorway moves
@@ -91,7 +92,7 @@ impl Twin {
                     let record = &self.records.triangles[(id - 1) as usize];
                     let (s, t) = unpack_barycentrics(barycentrics);
                     let emits = record.emitted.iter().any(|&channel| channel > 0.0);
-                    (emits, luminance(interpolant(record, s, t).as_dvec3()))
+                    (emits, luminance(interpolant(record, self.texture(record, s, t), s, t).as_dvec3()))
                 })
             })
             .collect();
@@ -112,6 +113,11 @@ impl Twin {
         }
     }
 
+    /// The colour of a triangle's texture, 1 without one.
+    fn texture(&self, record: &TriangleRecord, s: f32, t: f32) -> Vec3 {
+        texture_colour(&self.records.textures, record.texture(), s, t)
+    }
+
     /// Pass (c): the radiance or display-linear colour of a pixel.
     fn colour(&self, frame: &FrameUniform, mode: Mode, [id, barycentrics]: VisibilityPixel, place: Vec2) -> Vec3 {
         if id == 0 || id & BACK != 0 {
@@ -120,20 +126,21 @@ impl Twin {
         let id = id - 1;
         let record = &self.records.triangles[id as usize];
         let (s, t) = unpack_barycentrics(barycentrics);
+        let texture = self.texture(record, s, t);
         let exposed = |radiance: Vec3| (radiance * frame.exposure).map(tone_curve);
         let overlay = |colour| overlay(colour, frame, mode, record, &self.records.corners[id as usize], place);
         match mode {
-            Mode::Shaded => interpolant(record, s, t),
-            Mode::Gouraud => gouraud(record, s, t),
+            Mode::Shaded => interpolant(record, texture, s, t),
+            Mode::Gouraud => gouraud(record, texture, s, t),
             Mode::Ids => id_colour(id),
             Mode::Barycentrics => Vec3::new(s, t, 0.0),
             Mode::Elements => {
                 let [r, g, b, _] = self.records.elements[record.element as usize];
                 overlay(exposed(Vec3::new(r, g, b)))
             }
-            Mode::Mesh => overlay(exposed(interpolant(record, s, t))),
-            Mode::Discontinuities => overlay(0.35 * exposed(interpolant(record, s, t))),
-            Mode::FalseColor => false_color(interpolant(record, s, t), frame.exposure),
+            Mode::Mesh => overlay(exposed(interpolant(record, texture, s, t))),
+            Mode::Discontinuities => overlay(0.35 * exposed(interpolant(record, texture, s, t))),
+            Mode::FalseColor => false_color(interpolant(record, texture, s, t), frame.exposure),
         }
     }
 }
@@ -148,18 +155,18 @@ fn unpack_barycentrics(packed: u32) -> (f32, f32) {
     ((packed & 0xffff) as f32 / 65535.0, (packed >> 16) as f32 / 65535.0)
 }
 
-/// The quadratic, clamped at 0, and what the surface emits, W·sr⁻¹·m⁻².
-pub(crate) fn interpolant(record: &TriangleRecord, s: f32, t: f32) -> Vec3 {
+/// The quadratic, clamped at 0, times the texture's colour, and what the surface emits, W·sr⁻¹·m⁻².
+pub(crate) fn interpolant(record: &TriangleRecord, texture: Vec3, s: f32, t: f32) -> Vec3 {
     let [a, b2, c2, d, e2, f] = [record.a, record.b2, record.c2, record.d, record.e2, record.f].map(Vec3::from);
     let reflected = (a * s + b2 * t + c2) * s + (d * t + e2) * t + f;
-    reflected.max(Vec3::ZERO) + Vec3::from(record.emitted)
+    reflected.max(Vec3::ZERO) * texture + Vec3::from(record.emitted)
 }
 
 /// Linear between the values at the corners: F, A + 2C + F and D + 2E + F.
-fn gouraud(record: &TriangleRecord, s: f32, t: f32) -> Vec3 {
+fn gouraud(record: &TriangleRecord, texture: Vec3, s: f32, t: f32) -> Vec3 {
     let [a, c2, d, e2, f] = [record.a, record.c2, record.d, record.e2, record.f].map(Vec3::from);
     let reflected = (a + c2) * s + (d + e2) * t + f;
-    reflected.max(Vec3::ZERO) + Vec3::from(record.emitted)
+    reflected.max(Vec3::ZERO) * texture + Vec3::from(record.emitted)
 }
 
 /// A colour that neighbouring ids do not share: the id hashed (Jarzynski and Olano 2020, "pcg").

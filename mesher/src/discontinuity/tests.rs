@@ -2,7 +2,7 @@
 
 use glam::DQuat;
 use proptest::prelude::*;
-use scene::{Material, Polygon, Rgb};
+use scene::{Material, Polygon};
 
 use super::*;
 
@@ -14,11 +14,7 @@ fn v(x: f64, y: f64, z: f64) -> DVec3 {
 
 /// A scene of polygons given by their corners; equal positions are one vertex.
 pub(crate) fn welded(outlines: &[Vec<DVec3>]) -> Scene {
-    let mut scene = Scene {
-        materials: vec![Material { name: "grey".into(), reflectance: Rgb::splat(0.5), radiance: Rgb::ZERO }],
-        objects: vec!["all".into()],
-        ..Scene::default()
-    };
+    let mut scene = Scene { materials: vec![Material::grey("grey")], objects: vec!["all".into()], ..Scene::default() };
     for outline in outlines {
         let (first_corner, corner_count) = (scene.corners.len() as u32, outline.len() as u32);
         for &corner in outline {

@@ -43,7 +43,7 @@ fn read_materials(
         match (line.split_once(' '), materials.last_mut()) {
             (Some(("newmtl", name)), _) => {
                 known.insert(name.into(), materials.len() as u32);
-                materials.push(Material { name: name.into(), reflectance: Rgb::ZERO, radiance: Rgb::ZERO });
+                materials.push(Material { reflectance: Rgb::ZERO, ..Material::grey(name) });
             }
             (Some(("Kd", rest)), Some(material)) => material.reflectance = vector(rest)?,
             (Some(("Ke", rest)), Some(material)) => material.radiance = vector(rest)?,

@@ -7,8 +7,13 @@ struct Triangle {
     b2: vec3<f32>,
     edges: u32,
     c2: vec3<f32>,
+    // Words of `textures`: the first texel (0 for no texture) and, below, the corners' coordinates.
+    texels: u32,
     d: vec3<f32>,
+    // Width, and height in the upper half.
+    texture_size: u32,
     e2: vec3<f32>,
+    texture_corners: u32,
     f: vec3<f32>,
     emitted: vec3<f32>,
 }
@@ -22,6 +27,11 @@ struct Triangle {
 // Three corners of three numbers a triangle.
 @group(1) @binding(2) var<storage, read> corners: array<f32>;
 
+// The table of sRGB, texels and texture coordinates, as `texture_records.rs` lays them out.
+@group(1) @binding(3) var<storage, read> textures: array<u32>;
+
+// Whether any triangle has a texture: without, nothing of it is evaluated.
+override TEXTURED: bool;
 // One pipeline is made per mode: what the others need costs nothing then.
 override MODE: u32;
 const SHADED = 0u;
@@ -71,13 +81,46 @@ fn colour_at(id: u32, st: vec2<f32>, pixel: vec2<f32>) -> vec3<f32> {
 fn interpolant(id: u32, s: f32, t: f32) -> vec3<f32> {
     let reflected = (triangles[id].a * s + triangles[id].b2 * t + triangles[id].c2) * s
         + (triangles[id].d * t + triangles[id].e2) * t + triangles[id].f;
-    return max(reflected, vec3(0.0)) + triangles[id].emitted;
+    return max(reflected, vec3(0.0)) * texture_colour(id, s, t) + triangles[id].emitted;
 }
 
 // Linear between the values at the corners: F, A + 2C + F and D + 2E + F.
 fn gouraud(id: u32, s: f32, t: f32) -> vec3<f32> {
     let reflected = (triangles[id].a + triangles[id].c2) * s + (triangles[id].d + triangles[id].e2) * t + triangles[id].f;
-    return max(reflected, vec3(0.0)) + triangles[id].emitted;
+    return max(reflected, vec3(0.0)) * texture_colour(id, s, t) + triangles[id].emitted;
+}
+
+// The linear colour of the triangle's texture, bilinear and repeated; 1 without one.
+fn texture_colour(id: u32, s: f32, t: f32) -> vec3<f32> {
+    if !TEXTURED {
+        return vec3(1.0);
+    }
+    let texels = triangles[id].texels;
+    if texels == 0u {
+        return vec3(1.0);
+    }
+    let corners = triangles[id].texture_corners;
+    let a = texture_corner(corners);
+    let uv = a + (texture_corner(corners + 2u) - a) * s + (texture_corner(corners + 4u) - a) * t;
+    let size = vec2<i32>(i32(triangles[id].texture_size & 0xffffu), i32(triangles[id].texture_size >> 16u));
+    let place = (uv - floor(uv)) * vec2<f32>(size) - 0.5;
+    let part = place - floor(place);
+    let first = vec2<i32>(floor(place));
+    let upper = texel(texels, size, first) * (1.0 - part.x) + texel(texels, size, first + vec2(1, 0)) * part.x;
+    let lower = texel(texels, size, first + vec2(0, 1)) * (1.0 - part.x) + texel(texels, size, first + vec2(1, 1)) * part.x;
+    return upper * (1.0 - part.y) + lower * part.y;
+}
+
+fn texture_corner(word: u32) -> vec2<f32> {
+    return vec2(bitcast<f32>(textures[word]), bitcast<f32>(textures[word + 1u]));
+}
+
+// A texel in linear light; columns and rows from -1 to the size repeat.
+fn texel(texels: u32, size: vec2<i32>, place: vec2<i32>) -> vec3<f32> {
+    let inside = (place + size) % size;
+    let colour = textures[texels + u32(inside.y * size.x + inside.x)];
+    let values = vec3(textures[colour & 255u], textures[(colour >> 8u) & 255u], textures[(colour >> 16u) & 255u]);
+    return bitcast<vec3<f32>>(values);
 }
 
 // A colour that neighbouring ids do not share: the id hashed (Jarzynski and Olano 2020, "pcg").

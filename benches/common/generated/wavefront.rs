@@ -1,0 +1,47 @@
+//! A scene as Wavefront OBJ and MTL, which read back to the same scene.
+
+use std::fmt::Write;
+
+use scene::Scene;
+
+/// The OBJ text; `library` is the name of the MTL file beside it.
+pub fn obj(scene: &Scene, library: &str) -> String {
+    let mut text = format!("# {} polygons, metres, z up\n", scene.polygons.len());
+    for named in &scene.cameras {
+        let camera = &named.camera;
+        let [eye, direction, up] =
+            [camera.eye, camera.target - camera.eye, camera.up].map(|v| v.to_array().map(|c| c.to_string()).join(" "));
+        let fov = camera.vertical_fov.to_degrees();
+        let _ = writeln!(text, "# camera eye {eye} dir {direction} up {up} fov_deg {fov}");
+    }
+    let _ = writeln!(text, "mtllib {library}");
+    for v in &scene.vertices {
+        let _ = writeln!(text, "v {} {} {}", v.x, v.y, v.z);
+    }
+    let (mut object, mut material) = (None, None);
+    for polygon in &scene.polygons {
+        if object.replace(polygon.object) != Some(polygon.object) {
+            let _ = writeln!(text, "o {}", scene.objects[polygon.object as usize]);
+        }
+        if material.replace(polygon.material) != Some(polygon.material) {
+            let _ = writeln!(text, "usemtl {}", scene.materials[polygon.material as usize].name);
+        }
+        text.push('f');
+        for corner in &scene.corners[polygon.corner_range()] {
+            let _ = write!(text, " {}", corner + 1);
+        }
+        text.push('\n');
+    }
+    text
+}
+
+/// The MTL text.
+pub fn mtl(scene: &Scene) -> String {
+    let mut text = String::from("# Kd: linear RGB reflectance; Ke: emitted radiance, W/(m^2 sr), front side only\n");
+    for material in &scene.materials {
+        let [reflectance, radiance] =
+            [material.reflectance, material.radiance].map(|v| v.to_array().map(|c| c.to_string()).join(" "));
+        let _ = writeln!(text, "\nnewmtl {}\nKd {reflectance}\nKe {radiance}", material.name);
+    }
+    text
+}
