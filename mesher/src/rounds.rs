@@ -112,7 +112,7 @@ impl Rounds<'_> {
             let part = scene::area_vector(&fine.corners(triangle)).length();
             let polygon = fine.leaves[fine.mesh.triangles[triangle].leaf as usize].polygon;
             arrives += mean * part;
-            reflected += mean * part * self.scene.material(polygon).reflectance;
+            reflected += mean * part * self.scene.reflectance(polygon);
             area += part;
         }
         let (arrives, area) = (arrives.max(Rgb::ZERO), f64::max(area, f64::MIN_POSITIVE));

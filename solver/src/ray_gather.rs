@@ -103,7 +103,7 @@ impl RayGather {
             patches,
             other_sides: other_sides(scene),
             normals: scene.polygon_ids().map(|polygon| scene.plane(polygon).normal).collect(),
-            reflectances: scene.polygon_ids().map(|polygon| luminance(scene.material(polygon).reflectance)).collect(),
+            reflectances: scene.polygon_ids().map(|polygon| luminance(scene.reflectance(polygon))).collect(),
             size: scene.size(),
             rays,
             turn,
@@ -278,7 +278,7 @@ pub(crate) fn rays_for(source_error: f64) -> u32 {
 fn prominent(scene: &Scene, solution: &Solution) -> Vec<NodeId> {
     let elements = &solution.elements;
     let power = |patch: &Patch| {
-        let reflected = scene.material(patch.polygon).reflectance * solution.light[patch.root as usize].irradiance;
+        let reflected = scene.reflectance(patch.polygon) * solution.light[patch.root as usize].irradiance;
         luminance(reflected) * elements.nodes[patch.root as usize].area
     };
     let mut patches: Vec<(f64, NodeId)> = elements.patches.iter().map(|patch| (power(patch), patch.root)).collect();
@@ -387,12 +387,10 @@ mod tests {
             let mut seen = Vec::new();
             gather.seen_nodes(&solution, 4, position, DVec3::ZERO, &mut seen);
             let sum: f64 = seen.iter().map(|seen| seen.form_factor).sum();
-            println!("{position} {sum} of {}", seen.len());
             sums.push(sum - 1.0);
         }
         let mean = sums.iter().sum::<f64>() / 40.0;
         let square = (sums.iter().map(|x| x * x).sum::<f64>() / 40.0).sqrt();
-        println!("{mean} {square}");
         assert!(mean.abs() < 0.01 && square < 0.05, "{mean} {square}");
     }
 
