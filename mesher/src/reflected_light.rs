@@ -218,11 +218,14 @@ impl ReflectedLight {
         let found: Vec<Vec<Row>> = groups
             .par_iter()
             .map(|group| {
-                let element = gather.over(group[0].element);
+                let element = (solution.visibility == Visibility::Links).then(|| gather.over(group[0].element));
                 let mut seen = Vec::new();
                 let row = |query: &&SampleQuery| {
                     seen.clear();
-                    element.seen_nodes(query.position, query.inward, &mut seen);
+                    match &element {
+                        Some(element) => element.seen_nodes(query.position, query.inward, &mut seen),
+                        None => gather.seen_by_rays(query.polygon, query.position, query.inward, &mut seen),
+                    }
                     seen.iter().map(Seen::from).collect()
                 };
                 group.iter().map(row).collect()

@@ -139,7 +139,11 @@ fn residual_by_rays(
             let leaf = &fine.leaves[fine.mesh.triangles[triangle].leaf as usize];
             let position = at(fine.corners(triangle), (s, t));
             let emitted = halves[0].over_emitters(leaf.element).emitted(position, DVec3::ZERO);
-            let halves = halves.each_ref().map(|half| emitted + half.reflected_by_rays(leaf.polygon, position));
+            let halves = halves.each_ref().map(|half| {
+                let mut seen = Vec::new();
+                half.seen_by_rays(leaf.polygon, position, DVec3::ZERO, &mut seen);
+                emitted + half.irradiance_from(&seen)
+            });
             let baked = Interpolant::through(fine.table.triangles[triangle].map(|sample| samples[sample as usize]))
                 .evaluate(s, t);
             ResidualPoint {

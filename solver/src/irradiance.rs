@@ -30,6 +30,10 @@ const SOURCE_ERROR: f64 = 1e-3;
 /// What nodes may misplace where a bake is checked by other rays, as a part of what they may in the bake.
 const SMALLER: f64 = 0.25;
 
+/// Polygons whose boxes reach into the shaft to an emitter, at most, that are looked at one by one. Behind more, rays will tell
+/// what is seen of it in any case.
+const MOST_CANDIDATES: usize = 160;
+
 /// How other polygons touch a point of a polygon: how many values irradiance has there.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Contact {
@@ -297,15 +301,15 @@ impl<'a> Gather<'a> {
             Some(solid) => {
                 let body = self.solids.corners(self.scene, solid);
                 let above = body.iter().any(|&corner| plane.distance(corner) > tolerance);
-                let found = self.tree.in_shaft(&self.geometry, &Shaft::towards(outline, &body));
+                let found = self.tree.in_shaft(&self.geometry, &Shaft::towards(outline, &body), MOST_CANDIDATES);
                 let is_other = |blocker: &u32| *blocker != polygon && self.solids.of_polygon(*blocker) != Some(solid);
                 found.filter(|_| above).map(|found| found.into_iter().filter(is_other).collect::<Vec<u32>>())
             }
             None => {
                 let source = self.geometry.outline(emitter.polygon);
                 let parts = facing_parts(outline, &plane, source, &self.geometry.plane(emitter.polygon), tolerance);
-                let found =
-                    self.tree.in_shaft(&self.geometry, &Shaft::between(&parts.as_ref()?[0], &parts.as_ref()?[1]));
+                let shaft = Shaft::between(&parts.as_ref()?[0], &parts.as_ref()?[1]);
+                let found = self.tree.in_shaft(&self.geometry, &shaft, MOST_CANDIDATES);
                 let is_other = |blocker: &u32| *blocker != polygon && *blocker != emitter.polygon;
                 found.map(|found| found.into_iter().filter(is_other).collect())
             }
@@ -355,13 +359,12 @@ impl<'a> Gather<'a> {
         }
     }
 
-    /// Irradiance over reflectors at a position of a polygon that nothing touches, W·m⁻², where rays find it; else none.
-    pub fn reflected_by_rays(&self, polygon: u32, position: DVec3) -> Rgb {
-        let mut seen = Vec::new();
+    /// Appends the nodes of reflectors that rays find from a position of a polygon; nothing in a scene with links. `inward` as
+    /// for [`LeafGather::irradiance`].
+    pub fn seen_by_rays(&self, polygon: u32, position: DVec3, inward: DVec3, seen: &mut Vec<SeenNode>) {
         if let Some(rays) = self.rays() {
-            rays.seen_nodes(self.solution, polygon, position, DVec3::ZERO, &mut seen);
+            rays.seen_nodes(self.solution, polygon, position, inward, seen);
         }
-        self.irradiance_from(&seen)
     }
 
     /// Irradiance from the reflectors that a point sees, W·m⁻².

@@ -24,9 +24,13 @@ impl PolygonTree {
         self.ascending(|low, high| (point + reach).cmpge(low).all() && (point - reach).cmple(high).all())
     }
 
-    /// Polygons that stand in a shaft, ascending; none if one of them fills it, so that nothing passes.
-    pub fn in_shaft(&self, geometry: &Geometry, shaft: &Shaft<'_>) -> Option<Vec<u32>> {
+    /// Polygons that stand in a shaft, ascending; none if one of them fills it, so that nothing passes. Where the boxes of more
+    /// than `most` reach into it, all of these.
+    pub fn in_shaft(&self, geometry: &Geometry, shaft: &Shaft<'_>, most: usize) -> Option<Vec<u32>> {
         let mut found = self.ascending(|low, high| shaft.may_enter(low, high));
+        if found.len() > most {
+            return Some(found);
+        }
         let mut total = false;
         found.retain(|&polygon| match shaft.classify(geometry.outline(polygon)) {
             Occlusion::Clear => false,
