@@ -12,10 +12,15 @@ use solver::{Gather, NodeId, Solution};
 
 use crate::probe::{colour_mean, probe_point};
 use crate::samples::QueryKey;
+use crate::small_patch::middle_of_small;
 use crate::{
     Discontinuity, Leaf, LeafSegment, Mesh, RankedLine, SampleQuery, SampleTable, Weight, edge_table, leaf_meshes,
     rank, sample_table,
 };
+
+/// Length of patches, as a fraction of the scene's size, below which light from emitters is taken for the same all over them
+/// until a probe says otherwise. Larger shows facets where light changes within them.
+const SMALL_PATCH: f64 = 0.01;
 
 /// A mesh of all leaves, and what emitters send to its samples.
 pub(crate) struct FineMesh {
@@ -51,8 +56,11 @@ impl FineMesh {
         let table = sample_table(scene, &leaves, &mesh, &|polygon, position| gather.contact(polygon, position));
         let mut fine = Self { leaves, lines, mesh, table, emitted: Vec::new(), probed: Vec::new() };
         let probes: Vec<SampleQuery> = (0..fine.triangles()).map(|triangle| fine.probe_query(triangle)).collect();
-        known.find(&gather, fine.table.queries.iter().chain(&probes));
-        fine.emitted = known.at(&fine.table.queries);
+        let small = SMALL_PATCH * scene.size();
+        let stands_in = |query: &SampleQuery| middle_of_small(solution, query, small).unwrap_or(*query);
+        let queries: Vec<SampleQuery> = fine.table.queries.iter().map(stands_in).collect();
+        known.find(&gather, queries.iter().chain(&probes));
+        fine.emitted = known.at(&queries);
         fine.probed = known.at(&probes);
         fine
     }
@@ -94,6 +102,7 @@ impl EmittedLight {
     fn find<'a>(&mut self, gather: &Gather<'_>, queries: impl Iterator<Item = &'a SampleQuery>) {
         let mut unknown: Vec<&SampleQuery> = queries.filter(|query| !self.0.contains_key(&query.key())).collect();
         unknown.sort_by_key(|query| query.element);
+        unknown.dedup_by_key(|query| query.key());
         let groups: Vec<&[&SampleQuery]> = unknown.chunk_by(|a, b| a.element == b.element).collect();
         let found: Vec<Vec<Rgb>> = groups
             .par_iter()

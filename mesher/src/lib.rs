@@ -20,6 +20,7 @@ mod reflected_light;
 mod residual;
 mod rounds;
 mod samples;
+mod small_patch;
 #[cfg(test)]
 mod testing;
 mod weight;

@@ -20,6 +20,7 @@ use crate::fine_mesh::FineMesh;
 use crate::probe::{at, colour_mean, probe_point};
 use crate::projection::Projection;
 use crate::samples::QueryKey;
+use crate::small_patch::middle_of_small;
 use crate::{Leaf, Mesh, SampleQuery, SampleTable, edge_table, leaf_meshes, sample_table};
 
 /// Light over reflectors on all surfaces.
@@ -351,12 +352,8 @@ const ASIDE: f64 = 0.07;
 ///
 /// A patch of a scene of many that is shorter than `small`, metres, and has not been divided is looked at once, in its middle.
 fn stand_ins(solution: &Solution, query: &SampleQuery, small: f64) -> [SampleQuery; 2] {
-    let elements = &solution.elements;
-    let is_whole =
-        elements.patch_of(query.element).is_some_and(|patch| elements.patches[patch as usize].root == query.element);
-    if solution.visibility == Visibility::Rays && is_whole && elements.cell_length(query.element) < small {
-        let position = elements.nodes[query.element as usize].centre;
-        return [SampleQuery { position, inward: DVec3::ZERO, ..*query }; 2];
+    if let Some(middle) = middle_of_small(solution, query, small) {
+        return [middle; 2];
     }
     if query.inward == DVec3::ZERO {
         return [*query; 2];

@@ -34,7 +34,7 @@ const MOST_OBSTACLES: usize = 24;
 
 /// Rays that tell what is seen of a source, of one that is dim at the point and of a bright one. To stop early where the first few agree would take what is mostly seen for seen
 /// wholly.
-const SHARE_RAYS: [u32; 2] = [4, 36];
+const SHARE_RAYS: [u32; 2] = [4, 25];
 
 /// How far from a contact a point is taken to be before rays, along its direction of approach, as a fraction of the scene's
 /// size.

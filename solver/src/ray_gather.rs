@@ -30,6 +30,11 @@ const SCATTER: f64 = 0.6;
 const LEAST_RAYS: f64 = 64.0;
 const MOST_RAYS: f64 = 4096.0;
 
+/// A polygon with less area than the square of this fraction of the scene's size has this part of the rays: there are many, and
+/// what each is off by is lost among them.
+const SMALL_POLYGON: f64 = 0.01;
+const FEW_RAYS: f64 = 0.25;
+
 /// How far from a contact a point is taken to be, along its direction of approach, as a fraction of the scene's size: above
 /// the rounding of rays, below anything that light tells apart.
 const ASIDE: f64 = 1e-7;
@@ -71,8 +76,9 @@ pub(crate) struct RayGather {
     /// By polygon, luminance of its reflectance.
     reflectances: Vec<f64>,
     size: f64,
-    /// Rays from each point, and which of all possible ones.
-    rays: u32,
+    /// By polygon, rays from each of its points; the most of them; and which of all possible ones.
+    rays: Vec<u32>,
+    most: u32,
     turn: u32,
     /// Irradiance, luminance, W·m⁻², that may be misplaced on account of nodes that stand for the leaves that rays meet.
     budget: f64,
@@ -91,6 +97,9 @@ impl RayGather {
                 patches.push(id);
             }
         }
+        let small = (SMALL_POLYGON * scene.size()).powi(2);
+        let is_small = |polygon: u32| scene.area(polygon) < small;
+        let few = ((f64::from(rays) * FEW_RAYS) as u32).max(1);
         let prominent = prominent(scene, solution);
         let mut place_of = vec![NOT_PROMINENT; elements.patches.len()];
         for (place, &root) in (0..).zip(&prominent) {
@@ -105,7 +114,8 @@ impl RayGather {
             normals: scene.polygon_ids().map(|polygon| scene.plane(polygon).normal).collect(),
             reflectances: scene.polygon_ids().map(|polygon| luminance(scene.reflectance(polygon))).collect(),
             size: scene.size(),
-            rays,
+            rays: scene.polygon_ids().map(|polygon| if is_small(polygon) { few } else { rays }).collect(),
+            most: rays,
             turn,
             budget,
         }
@@ -180,7 +190,8 @@ impl RayGather {
             outline[1..].windows(2).map(|edge| (edge[0] - outline[0]).cross(edge[1] - outline[0]).length()).collect();
         let total: f64 = areas.iter().sum();
         let is_bright = self.reflectances[polygon as usize] * luminance(light.irradiance) * form_factor > self.budget;
-        let rays = AIMED_RAYS[usize::from(is_bright)].max((form_factor * f64::from(self.rays)) as u32);
+        let rays =
+            AIMED_RAYS[usize::from(is_bright)].max((form_factor * f64::from(self.rays[from.polygon as usize])) as u32);
         let (mut arrives, mut all, mut middle) = (0.0, 0.0, DVec3::ZERO);
         for i in 0..rays {
             let place = spread_over(outline, &areas, total, from.shift + DVec2::splat(f64::from(node) * STEP[0]), i);
@@ -210,8 +221,9 @@ impl RayGather {
     /// Adds what rays over the hemisphere meet of patches that are not looked at.
     fn look_around(&self, solution: &Solution, from: &Origin, looked_at: &[bool], seen: &mut Vec<SeenNode>) {
         let elements = &solution.elements;
-        let share = 1.0 / f64::from(self.rays);
-        for direction in hemisphere(from.normal, self.rays, from.shift) {
+        let rays = self.rays[from.polygon as usize];
+        let share = 1.0 / f64::from(rays);
+        for direction in hemisphere(from.normal, rays, from.shift) {
             let meets = |triangle: u32| {
                 let met = elements.patches[self.patches[triangle as usize] as usize].polygon;
                 !self.is_own(from.polygon, met)
@@ -243,12 +255,12 @@ impl RayGather {
     /// for all leaves that it sees: by each ray something else.
     pub fn misplaced(&self, solution: &Solution, node: NodeId) -> f64 {
         let polygon = solution.elements.polygon_of(node).unwrap_or_default();
-        self.reflectances[polygon as usize] * solution.light[node as usize].deviation / f64::from(self.rays).sqrt()
+        self.reflectances[polygon as usize] * solution.light[node as usize].deviation / f64::from(self.most).sqrt()
     }
 
     /// What rays are off by at a point, root mean square, relative to the light over reflectors there: as measured in rooms.
     pub fn scatter(&self) -> f64 {
-        SCATTER * f64::from(self.rays).powf(-0.75)
+        SCATTER * f64::from(self.most).powf(-0.75)
     }
 
     /// The largest node of a patch around a place that is good enough.
