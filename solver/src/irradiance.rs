@@ -14,6 +14,7 @@ use glam::DVec3;
 use scene::{Rgb, Scene, luminance};
 
 use crate::clip::{Position, locate};
+use crate::emitter::{Emitter, emitters};
 use crate::geometry::Geometry;
 use crate::leaf_gather::{LeafGather, SeenNode, Source};
 use crate::polygon_tree::PolygonTree;
@@ -55,7 +56,7 @@ pub struct Gather<'a> {
     pub(crate) geometry: Geometry,
     pub(crate) solids: Solids,
     pub(crate) tree: PolygonTree,
-    emitters: Vec<Emitter>,
+    pub(crate) emitters: Vec<Emitter>,
     /// Prepared when a point asks for reflectors first, in a scene where rays find them.
     rays: OnceLock<RayGather>,
     /// Rays from a point, and their turn.
@@ -72,14 +73,6 @@ enum Opening {
     ByIrradiance(f64),
     /// Those whose radiosity strays from their plane by more than this, whoever asks.
     ByRadiosity(f64),
-}
-
-/// A source of emitted light in a scene without links.
-#[derive(Clone, Copy)]
-struct Emitter {
-    polygon: u32,
-    /// The convex solid whose faces all emit the same, and which the polygon stands for.
-    solid: Option<u32>,
 }
 
 /// What a gather needs to know of a link.
@@ -129,7 +122,7 @@ impl<'a> Gather<'a> {
         let radiosity = scene.polygon_ids().map(radiosity).collect();
         let geometry = Geometry::new(scene);
         let solids = Solids::new(scene, &geometry);
-        let emitters = emitters(scene, &solids);
+        let emitters = emitters(scene);
         let tree = PolygonTree::new(scene);
         Self { scene, solution, geometry, solids, tree, emitters, rays: OnceLock::new(), sampling, opening, radiosity }
     }
@@ -296,38 +289,30 @@ impl<'a> Gather<'a> {
         let polygon = elements.polygon_of(element).unwrap_or_default();
         let (outline, plane) = (elements.outline(element), self.geometry.plane(polygon));
         let tolerance = self.geometry.contact_tolerance;
-        let blockers = |emitter: &Emitter| match emitter.solid {
-            Some(solid) if self.solids.of_polygon(polygon) == Some(solid) => None,
-            Some(solid) => {
-                let body = self.solids.corners(self.scene, solid);
-                let above = body.iter().any(|&corner| plane.distance(corner) > tolerance);
-                let found = self.tree.in_shaft(&self.geometry, &Shaft::towards(outline, &body), MOST_CANDIDATES);
-                let is_other = |blocker: &u32| *blocker != polygon && self.solids.of_polygon(*blocker) != Some(solid);
-                found.filter(|_| above).map(|found| found.into_iter().filter(is_other).collect::<Vec<u32>>())
-            }
-            None => {
-                let source = self.geometry.outline(emitter.polygon);
-                let parts = facing_parts(outline, &plane, source, &self.geometry.plane(emitter.polygon), tolerance);
-                let shaft = Shaft::between(&parts.as_ref()?[0], &parts.as_ref()?[1]);
-                let found = self.tree.in_shaft(&self.geometry, &shaft, MOST_CANDIDATES);
-                let is_other = |blocker: &u32| *blocker != polygon && *blocker != emitter.polygon;
-                found.map(|found| found.into_iter().filter(is_other).collect())
-            }
+        let blockers = |emitter: &Emitter| {
+            let is_other = |blocker: &u32| *blocker != polygon && emitter.polygons.binary_search(blocker).is_err();
+            let found = if emitter.body.is_empty() {
+                let source = emitter.polygons[0];
+                let (source, facing) = (self.geometry.outline(source), self.geometry.plane(source));
+                let [near, far] = facing_parts(outline, &plane, source, &facing, tolerance)?;
+                self.tree.in_shaft(&self.geometry, &Shaft::between(&near, &far), MOST_CANDIDATES)
+            } else if emitter.body.iter().any(|&corner| plane.distance(corner) > tolerance) {
+                self.tree.in_shaft(&self.geometry, &Shaft::towards(outline, &emitter.body), MOST_CANDIDATES)
+            } else {
+                None
+            };
+            found.map(|found| found.into_iter().filter(is_other).collect::<Vec<u32>>())
         };
-        let source = |emitter: &Emitter| {
+        let source = |(number, emitter): (usize, &Emitter)| {
+            if emitter.polygons.binary_search(&polygon).is_ok() {
+                return None; // Convex: no part of it sees another.
+            }
             let blockers = blockers(emitter)?;
-            let polygon = emitter.polygon;
-            Some(Source {
-                polygon,
-                solid: emitter.solid,
-                roots: Vec::new(),
-                part: None,
-                blockers,
-                before: OnceCell::new(),
-            })
+            let body = (!emitter.body.is_empty()).then_some(number as u32);
+            let polygon = emitter.polygons[0];
+            Some(Source { polygon, body, roots: Vec::new(), part: None, blockers, before: OnceCell::new() })
         };
-        let sources: Vec<Source> =
-            self.emitters.iter().filter(|emitter| emitter.polygon != polygon).filter_map(source).collect();
+        let sources: Vec<Source> = self.emitters.iter().enumerate().filter_map(source).collect();
         let mut blockers: Vec<u32> = sources.iter().flat_map(|source| source.blockers.iter().copied()).collect();
         blockers.sort_unstable();
         blockers.dedup();
@@ -347,7 +332,7 @@ impl<'a> Gather<'a> {
             (root, if all > 0.0 { visible / all } else { 0.0 })
         };
         let roots = links.chunk_by(|a, b| a.patch == b.patch).map(root).collect();
-        Source { polygon: links[0].polygon, solid: None, roots, part: None, blockers, before: OnceCell::new() }
+        Source { polygon: links[0].polygon, body: None, roots, part: None, blockers, before: OnceCell::new() }
     }
 
     /// Irradiance at a position in the plane of a polygon, W·m⁻²; `inward` is the direction in the plane from whose
@@ -412,20 +397,4 @@ impl<'a> Gather<'a> {
         }
         None
     }
-}
-
-/// What emits in a scene: polygons, and convex solids that emit the same all over. From outside such a solid looks like its
-/// outline, so that a bulb of hundreds of triangles is one source.
-fn emitters(scene: &Scene, solids: &Solids) -> Vec<Emitter> {
-    let mut emitters: Vec<Emitter> = Vec::new();
-    for polygon in scene.emitters() {
-        let exitance = scene.material(polygon).exitance();
-        let is_even =
-            |solid: &u32| solids.faces(*solid).iter().all(|&face| scene.material(face).exitance() == exitance);
-        let solid = solids.of_polygon(polygon).filter(|&solid| solids.is_closed(solid)).filter(is_even);
-        if solid.is_none_or(|solid| solids.faces(solid).first() == Some(&polygon)) {
-            emitters.push(Emitter { polygon, solid });
-        }
-    }
-    emitters
 }

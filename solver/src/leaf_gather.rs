@@ -17,6 +17,7 @@ use scene::{Plane, Rgb, luminance};
 use crate::backprojection::{BlockerCone, Fragments, SLIVER, Viewpoint};
 use crate::blocker::Blocker;
 use crate::clip::clip_convex;
+use crate::emitter::outline_of;
 use crate::form_factor::{form_factor_at, point_form_factor};
 use crate::ray_gather::{shift, spread_over};
 use crate::{Gather, NodeId, Visibility};
@@ -63,8 +64,8 @@ pub struct LeafGather<'a> {
 #[derive(Clone)]
 pub(crate) struct Source {
     pub polygon: u32,
-    /// The convex solid that it stands for, if it is one whose faces all emit the same.
-    pub solid: Option<u32>,
+    /// The emitter that it is, if it is a convex body.
+    pub body: Option<u32>,
     /// Root nodes of the patches that it stands for, each with its visible fraction, 0..=1, as the links know it.
     pub roots: Vec<(NodeId, f64)>,
     /// The root, if it stands for one patch of several alone.
@@ -171,35 +172,39 @@ impl LeafGather<'_> {
         obstacles
     }
 
-    /// The plane that a source lies in, its front towards the element. For a solid it is the one through the middle: what is
+    /// The plane that a source lies in, its front towards the element. For a body it is the one through the middle: what is
     /// beyond it hides nothing.
     fn plane(&self, source: &Source) -> Plane {
-        let Gather { scene, geometry, solids, .. } = self.gather;
-        let Some(solid) = source.solid else { return geometry.plane(source.polygon) };
-        let corners = solids.corners(scene, solid);
+        let Some(body) = source.body else { return self.gather.geometry.plane(source.polygon) };
+        let corners = &self.gather.emitters[body as usize].body;
         let middle = corners.iter().sum::<DVec3>() / corners.len().max(1) as f64;
         let normal = (self.centre - middle).normalize_or_zero();
         Plane { normal, offset: normal.dot(middle) }
     }
 
-    /// Irradiance of unit exitance from a solid, as far as it is seen.
-    fn solid_form_factor(
+    /// Irradiance of unit exitance from a body, as far as it is seen. From so near that it has no outline its faces count one
+    /// by one, and nothing is taken to stand between.
+    fn body_form_factor(
         &self,
         source: &Source,
-        solid: u32,
+        body: u32,
         from: &Viewpoint,
         cones: &mut Cones,
         fragments: &mut Fragments,
     ) -> f64 {
-        let Gather { scene, geometry, solids, .. } = self.gather;
-        let Some(cone) = solids.cone(scene, geometry, solid, from) else { return 0.0 };
+        let Gather { geometry, emitters, .. } = self.gather;
+        let emitter = &emitters[body as usize];
+        let Some(cone) = outline_of(&emitter.body, from.position) else {
+            let faces = emitter.polygons.iter().filter(|&&face| geometry.plane(face).distance(from.position) > 0.0);
+            return faces.map(|&face| form_factor_at(from.position, from.up, geometry.outline(face))).sum();
+        };
         fragments.start(cone.corners(), from.up);
         let obstacles = source.before.get_or_init(|| self.before(source));
         if obstacles.len() > MOST_OBSTACLES {
             let unoccluded = fragments.measure(from.up);
-            let distance = solids.corners(scene, solid)[0].distance(from.position);
+            let distance = emitter.body[0].distance(from.position);
             let outline: Vec<DVec3> = cone.corners().iter().map(|corner| from.position + corner * distance).collect();
-            let passes = |polygon: u32| solids.of_polygon(polygon) == Some(solid);
+            let passes = |polygon: u32| emitter.polygons.binary_search(&polygon).is_ok();
             return unoccluded * self.seen_share(&outline, SHARE_RAYS[1], from, passes);
         }
         for obstacle in obstacles {
@@ -281,8 +286,8 @@ impl LeafGather<'_> {
             if !emits && !reflects {
                 continue;
             }
-            if let Some(solid) = source.solid {
-                total += self.solid_form_factor(source, solid, &from, &mut cones, &mut fragments) * material.exitance();
+            if let Some(body) = source.body {
+                total += self.body_form_factor(source, body, &from, &mut cones, &mut fragments) * material.exitance();
                 continue;
             }
             let outline = source.outline(gather);

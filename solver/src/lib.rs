@@ -10,6 +10,7 @@ mod clip;
 mod contour;
 mod cut;
 mod element;
+mod emitter;
 mod form_factor;
 mod geometry;
 mod irradiance;

@@ -69,21 +69,6 @@ impl Solids {
         self.of_polygon[polygon as usize]
     }
 
-    /// The polygons of a solid, ascending.
-    pub fn faces(&self, solid: u32) -> &[u32] {
-        &self.solids[solid as usize].faces
-    }
-
-    /// Whether a solid lacks no face.
-    pub fn is_closed(&self, solid: u32) -> bool {
-        self.solids[solid as usize].opening.is_none()
-    }
-
-    /// Corners of a solid, metres; each as often as edges start from it.
-    pub fn corners(&self, scene: &Scene, solid: u32) -> Vec<DVec3> {
-        self.solids[solid as usize].edges.iter().map(|edge| scene.vertices[edge.from as usize]).collect()
-    }
-
     /// Whether all of a solid lies in front of a plane, or on it.
     pub fn is_before(&self, scene: &Scene, solid: u32, plane: &Plane, tolerance: f64) -> bool {
         let edges = &self.solids[solid as usize].edges;
