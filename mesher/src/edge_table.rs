@@ -117,6 +117,7 @@ pub fn edge_table(scene: &Scene, cuts: &[Vec<Cut>], leaves: &[Leaf]) -> EdgeTabl
         .collect();
     let splits = split_edges(&places, &mut vertices);
 
+    let cuts: Vec<CutIndex<'_>> = cuts.par_iter().map(|cuts| CutIndex::new(cuts)).collect();
     let arrangements: Vec<Arrangement> = leaves
         .par_iter()
         .zip(&mut leaf_edges)
@@ -125,8 +126,8 @@ pub fn edge_table(scene: &Scene, cuts: &[Vec<Cut>], leaves: &[Leaf]) -> EdgeTabl
             edges.border = splits.applied_to(&edges.border);
             let ends = |segment: usize, end: usize| splits.ends.get(&(index as u32, segment as u32, end as u32));
             let arrangement = arrange_leaf(leaf, edges, &places, ends, &vertices, weld);
-            let cuts = cuts.get(leaf.polygon as usize).map_or(&[][..], Vec::as_slice);
-            mark_border(&mut edges.border, &vertices, cuts, &arrangement.along_border, weld);
+            let cuts = cuts.get(leaf.polygon as usize).map_or_else(Vec::new, |cuts| cuts.around(&leaf.outline, weld));
+            mark_border(&mut edges.border, &vertices, &cuts, &arrangement.along_border, weld);
             arrangement
         })
         .collect();
@@ -186,6 +187,29 @@ fn border(corners: &[u32], vertices: &[DVec3], index: &VertexIndex<'_>) -> Vec<B
     }
     remove_spurs(&mut border);
     border
+}
+
+/// Finds the cuts of a polygon that pass a leaf.
+struct CutIndex<'a> {
+    cuts: &'a [Cut],
+    boxes: Bvh,
+}
+
+impl<'a> CutIndex<'a> {
+    fn new(cuts: &'a [Cut]) -> Self {
+        let segment = |cut: &Cut| [cut.ends[0], cut.ends[1], cut.ends[1]];
+        Self { cuts, boxes: Bvh::of_triangles(cuts.iter().map(segment).collect()) }
+    }
+
+    /// The cuts whose boxes overlap that of an outline, padded by twice the weld; ascending.
+    fn around(&self, outline: &[DVec3], weld: f64) -> Vec<&'a Cut> {
+        let low = outline.iter().copied().fold(DVec3::INFINITY, DVec3::min) - 2.0 * weld;
+        let high = outline.iter().copied().fold(DVec3::NEG_INFINITY, DVec3::max) + 2.0 * weld;
+        let mut found = Vec::new();
+        self.boxes.within(|from, to| from.cmple(high).all() && low.cmple(to).all(), |id| found.push(id));
+        found.sort_unstable();
+        found.into_iter().map(|id| &self.cuts[id as usize]).collect()
+    }
 }
 
 /// Finds the vertices on an edge.
@@ -375,7 +399,7 @@ fn arrange_leaf<'a>(
 }
 
 /// Marks the edges of a border that lie on cuts or along discontinuities.
-fn mark_border(border: &mut [BorderEdge], vertices: &[DVec3], cuts: &[Cut], along: &[Segment], weld: f64) {
+fn mark_border(border: &mut [BorderEdge], vertices: &[DVec3], cuts: &[&Cut], along: &[Segment], weld: f64) {
     let count = border.len();
     for segment in along {
         let [a, b] = segment.ends.map(|end| end as usize);
@@ -392,7 +416,7 @@ fn mark_border(border: &mut [BorderEdge], vertices: &[DVec3], cuts: &[Cut], alon
     for i in 0..count {
         let ends = [border[i].from, border[(i + 1) % count].from].map(|vertex| vertices[vertex as usize]);
         let lies_on = |cut: &&Cut| ends.iter().all(|&end| distance_to_segment(end, cut.ends) <= 2.0 * weld);
-        if cuts.iter().find(lies_on).is_some() {
+        if cuts.iter().any(lies_on) {
             border[i].kind = EdgeKind::Cut;
         }
     }

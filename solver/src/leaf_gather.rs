@@ -33,9 +33,9 @@ const CURVATURE: f64 = 2.0;
 /// rays tell what is seen of it. Less leaves penumbrae to rays that exact ones would be had for.
 const MOST_OBSTACLES: usize = 24;
 
-/// Rays that tell what is seen of a source, of one that is dim at the point and of a bright one. To stop early where the first few agree would take what is mostly seen for seen
+/// Rays that tell what is seen of a source: of one that is faint, of one that is dim at the point, and of a bright one. To stop early where the first few agree would take what is mostly seen for seen
 /// wholly.
-const SHARE_RAYS: [u32; 2] = [4, 25];
+const SHARE_RAYS: [u32; 3] = [2, 9, 25];
 
 /// How far from a contact a point is taken to be before rays, along its direction of approach, as a fraction of the scene's
 /// size.
@@ -70,8 +70,8 @@ pub(crate) struct Source {
     pub roots: Vec<(NodeId, f64)>,
     /// The root, if it stands for one patch of several alone.
     pub part: Option<NodeId>,
-    /// Polygons that may hide it, ascending.
-    pub blockers: Vec<u32>,
+    /// Polygons that may hide it, ascending; none if it is too faint for them to be looked for.
+    pub blockers: Option<Vec<u32>>,
     /// The same as they are before the source: found out when a point needs them first, since most sources are too dim for
     /// that.
     pub before: OnceCell<Vec<Obstacle>>,
@@ -157,7 +157,7 @@ impl LeafGather<'_> {
         let Gather { scene, geometry, solids, .. } = self.gather;
         let plane = self.plane(source);
         let mut obstacles: Vec<Obstacle> = Vec::new();
-        for &polygon in &source.blockers {
+        for &polygon in source.blockers.iter().flatten() {
             let number = self.blockers.partition_point(|&other| other < polygon);
             let Some(blocker) = Blocker::before(geometry, &plane, polygon) else { continue };
             let known = |solid: u32| obstacles.iter().position(|obstacle| obstacle.solid == Some(solid));
@@ -205,7 +205,7 @@ impl LeafGather<'_> {
             let distance = emitter.body[0].distance(from.position);
             let outline: Vec<DVec3> = cone.corners().iter().map(|corner| from.position + corner * distance).collect();
             let passes = |polygon: u32| emitter.polygons.binary_search(&polygon).is_ok();
-            return unoccluded * self.seen_share(&outline, SHARE_RAYS[1], from, passes);
+            return unoccluded * self.seen_share(&outline, SHARE_RAYS[2], from, passes);
         }
         for obstacle in obstacles {
             if fragments.is_empty() {
@@ -312,11 +312,13 @@ impl LeafGather<'_> {
                 continue;
             }
             let obstacles = source.before.get_or_init(|| self.before(source));
-            if !obstacles.is_empty() && !touches && self.gather.solution.visibility == Visibility::Rays {
+            let is_faint = source.blockers.is_none();
+            let is_hidden = !obstacles.is_empty() || is_faint;
+            if is_hidden && !touches && self.gather.solution.visibility == Visibility::Rays {
                 let unoccluded = fragments.measure(up);
                 let is_dim = luminance(unoccluded * material.exitance()) <= self.gather.budget();
-                if is_dim || obstacles.len() > MOST_OBSTACLES {
-                    let rays = if is_dim { SHARE_RAYS[0] } else { SHARE_RAYS[1] };
+                if is_faint || is_dim || obstacles.len() > MOST_OBSTACLES {
+                    let rays = SHARE_RAYS[if is_faint { 0 } else { 1 + usize::from(!is_dim) }];
                     let share = self.seen_share(outline, rays, &from, |polygon| polygon == source.polygon);
                     total += share * unoccluded * material.exitance();
                     continue;
