@@ -5,6 +5,7 @@
 #![allow(clippy::print_stdout, clippy::unwrap_used)]
 
 mod common;
+#[allow(unused_imports, reason = "halls alone, no rooms")]
 #[path = "common/generated/mod.rs"]
 mod generated;
 

@@ -7,14 +7,13 @@
 //! the mean square is that of the products of the two differences, in which what scatter there is cancels.
 
 use std::collections::HashSet;
-use std::f64::consts::TAU;
 
 use glam::{DVec2, DVec3};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use rayon::prelude::*;
 use scene::{Bvh, Interpolant, Ray, Rgb, Scene, other_sides};
-use solver::{Gather, NodeId, SeenNode, Solution, Visibility};
+use solver::{Gather, NodeId, SeenNode, Solution, Visibility, hemisphere};
 
 use crate::fine_mesh::FineMesh;
 use crate::probe::{at, colour_mean};
@@ -110,7 +109,8 @@ pub(crate) fn residual(
             let rays =
                 if seen.is_empty() { 0 } else { (scatter / (accepted * accepted)).clamp(RAYS[0], RAYS[1]) as u32 };
             let halves = [(); 2].map(|()| {
-                let sum: Rgb = hemisphere(normal, rays, &mut random).map(differs).sum();
+                let shift = DVec2::new(uniform(&mut random), uniform(&mut random));
+                let sum: Rgb = hemisphere(normal, rays, shift).map(differs).sum();
                 known + sum / f64::from(rays.max(1))
             });
             let baked = value(samples, triangle, s, t);
@@ -195,19 +195,6 @@ fn points(fine: &FineMesh) -> Vec<(usize, f64, f64)> {
             (triangle < ends.len()).then_some((triangle, s, t))
         })
         .collect()
-}
-
-/// Directions about a normal with a density of the cosine over π: a rank-1 lattice with a random shift, spread evenly.
-fn hemisphere(normal: DVec3, count: u32, random: &mut ChaCha8Rng) -> impl Iterator<Item = DVec3> + use<> {
-    /// The powers of the plastic number, whose multiples fill the square evenly (Roberts 2018).
-    const STEP: [f64; 2] = [0.754_877_666_246_692_8, 0.569_840_290_998_053_3];
-    let shift = [uniform(random), uniform(random)];
-    let (x, y) = normal.any_orthonormal_pair();
-    (0..count).map(move |i| {
-        let u = (shift[0] + f64::from(i) * STEP[0]).fract();
-        let (sin, cos) = (TAU * (shift[1] + f64::from(i) * STEP[1]).fract()).sin_cos();
-        (x * cos + y * sin) * u.sqrt() + normal * (1.0 - u).sqrt()
-    })
 }
 
 /// Uniform in 0..1, never 1: the 53 bits that an f64 holds.

@@ -35,6 +35,7 @@ pub use element::{Elements, Node, NodeId, NodeKind, Patch};
 pub use form_factor::{exchange, form_factor, form_factor_at, point_form_factor};
 pub use irradiance::{Contact, Gather};
 pub use leaf_gather::{LeafGather, SeenNode};
+pub use ray_gather::hemisphere;
 pub use solution::{
     BlockerLists, Convergence, Cut, ElementLight, Interaction, Link, LinkSource, Solution, SolveOptions, Visibility,
 };

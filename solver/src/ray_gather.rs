@@ -326,7 +326,7 @@ fn merge(seen: &mut Vec<SeenNode>, first: usize) {
 }
 
 /// Directions about a normal with a density of the cosine over π: a rank-1 lattice, shifted, spread evenly.
-pub(crate) fn hemisphere(normal: DVec3, count: u32, shift: DVec2) -> impl Iterator<Item = DVec3> {
+pub fn hemisphere(normal: DVec3, count: u32, shift: DVec2) -> impl Iterator<Item = DVec3> {
     let (x, y) = normal.any_orthonormal_pair();
     (0..count).map(move |i| {
         let u = (shift.x + f64::from(i) * STEP[0]).fract();
