@@ -19,7 +19,7 @@ use crate::blocker::Blocker;
 use crate::clip::clip_convex;
 use crate::emitter::outline_of;
 use crate::form_factor::{form_factor_at, point_form_factor};
-use crate::ray_gather::{shift, spread_over};
+use crate::ray_gather::{ASIDE, shift, spread_over};
 use crate::{Gather, NodeId, Visibility};
 
 /// The part of a source's form factor from which on nothing is taken to hide it: above the rounding of its clipping.
@@ -36,10 +36,6 @@ const MOST_OBSTACLES: usize = 24;
 /// Rays that tell what is seen of a source: of one that is faint, of one that is dim at the point, and of a bright one. To stop early where the first few agree would take what is mostly seen for seen
 /// wholly.
 const SHARE_RAYS: [u32; 3] = [2, 9, 25];
-
-/// How far from a contact a point is taken to be before rays, along its direction of approach, as a fraction of the scene's
-/// size.
-const ASIDE: f64 = 1e-7;
 
 /// Six points that integrate a polynomial of degree 4 over a triangle: weights, and barycentrics of which the second counts
 /// twice (Dunavant, "High Degree Efficient Symmetrical Gaussian Quadrature Rules for the Triangle", 1985). A point a

@@ -23,7 +23,8 @@ const STEP: [f64; 2] = [0.754_877_666_246_692_8, 0.569_840_290_998_053_3];
 const RAYS: f64 = 256.0;
 const RAYS_ERROR: f64 = 0.0036;
 
-/// What a single ray would be off by, relative to the light over reflectors.
+/// What a single ray would be off by, relative to the light over reflectors: a guess that suits a furnished room, not a measured
+/// figure. Less divides leaves for what rays scatter by, more leaves errors of that size alone.
 const SCATTER: f64 = 0.6;
 
 /// Rays from a point at least and at most.
@@ -37,7 +38,7 @@ const FEW_RAYS: f64 = 0.25;
 
 /// How far from a contact a point is taken to be, along its direction of approach, as a fraction of the scene's size: above
 /// the rounding of rays, below anything that light tells apart.
-const ASIDE: f64 = 1e-7;
+pub(crate) const ASIDE: f64 = 1e-7;
 
 /// Patches that are looked at one by one, at most, and the part of all reflected light that they send at most: more cost every
 /// point, fewer leave bright ones to chance.
@@ -258,7 +259,7 @@ impl RayGather {
         self.reflectances[polygon as usize] * solution.light[node as usize].deviation / f64::from(self.most).sqrt()
     }
 
-    /// What rays are off by at a point, root mean square, relative to the light over reflectors there: as measured in rooms.
+    /// What rays are taken to be off by at a point, root mean square, relative to the light over reflectors there.
     pub fn scatter(&self) -> f64 {
         SCATTER * f64::from(self.most).powf(-0.75)
     }
