@@ -1,18 +1,30 @@
 //! What a ray meets: a bounding volume hierarchy over triangles. The only file that names the BVH library.
 //!
 //! The library walks boxes in f32; boxes are padded so that it never skips a triangle that the exact f64
-//! intersection would hit, and hits are decided by [`intersect_triangle`] alone.
+//! intersection would hit, and hits are decided by [`ShearedRay::intersect`] alone.
 
 use std::time::Duration;
 
-use glam::DVec3;
-use obvhs::{Boundable, BvhBuildParams, aabb::Aabb, bvh2::Bvh2, bvh2::builder::build_bvh2, ray::RayHit};
+use glam::{DVec3, Vec3A};
+use obvhs::{Boundable, BvhBuildParams, aabb::Aabb, cwbvh::CwBvh, cwbvh::builder::build_cwbvh, ray::RayHit};
 
-use crate::{Ray, Scene, intersect_triangle};
+use crate::{Ray, Scene, ShearedRay};
 
 /// Padding of every box, as a fraction of the largest coordinate: several f32 roundings of a point and of a ray's
-/// direction. Larger only costs time.
+/// direction. Larger only costs time. It bounds the depth of the hierarchy, too: between this and the whole there is no room
+/// for boxes that grow from level to level more often than the library has places for.
 const PADDING: f64 = 4e-6;
+
+/// What the library counts as one, in lengths of a ray's direction. It skips boxes that end before a ten-thousandth of its one:
+/// so nothing is near enough for that.
+const LIBRARY_UNIT: f32 = 1.0 / (1u32 << 24) as f32;
+
+/// The least component of a direction, as a fraction of the largest, by which boxes are sought: below, what a ray moves across
+/// all that f32 tells apart is less than a box's padding.
+const LEAST_COMPONENT: f64 = 1e-12;
+
+/// The largest inverse that leaves room for coordinates in f32.
+const LARGEST_INVERSE: f64 = 1e24;
 
 /// Cosine of the largest angle at which a surface's normal agrees with a stated one: 25°, wide enough for a normal
 /// that was rounded or interpolated, far from that of the next face of a box.
@@ -20,7 +32,7 @@ const AGREEMENT: f64 = 0.9;
 
 /// A hierarchy over triangles.
 pub struct Bvh {
-    bvh: Bvh2,
+    bvh: CwBvh,
     /// In the order of the hierarchy's leaves, so that those that are met together lie together.
     triangles: Vec<[DVec3; 3]>,
     /// What the caller calls each triangle, in the same order.
@@ -76,7 +88,7 @@ impl Bvh {
         let largest = triangles.iter().flatten().map(|p| p.abs().max_element()).fold(0.0, f64::max);
         let padded: Vec<_> =
             triangles.iter().map(|triangle| Padded(triangle, largest * PADDING + f64::MIN_POSITIVE)).collect();
-        let bvh = build_bvh2(&padded, BvhBuildParams::medium_build(), &mut Duration::default());
+        let bvh = build_cwbvh(&padded, BvhBuildParams::medium_build(), &mut Duration::default());
         let order = || bvh.primitive_indices.iter().map(|&index| index as usize);
         let (triangles, owners) = (order().map(|i| triangles[i]).collect(), order().map(|i| owners[i]).collect());
         Self { bvh, triangles, owners }
@@ -91,15 +103,16 @@ impl Bvh {
 
     fn closest(&self, ray: &Ray, accept: impl Fn(u32, f64) -> bool) -> Option<Hit> {
         let mut best: Option<(f64, usize, f64, f64)> = None;
+        let sheared = ShearedRay::new(ray);
         self.bvh.ray_traverse(library_ray(ray, f32::INFINITY), &mut RayHit::none(), |_, slot| {
-            match intersect_triangle(ray, self.triangles[slot]) {
+            match sheared.intersect(&self.triangles[slot]) {
                 Some((distance, s, t)) if accept(self.owners[slot], distance) => {
                     let first = |other: usize| self.bvh.primitive_indices[slot] < self.bvh.primitive_indices[other];
                     if best.is_none_or(|(d, other, ..)| distance < d || (distance == d && first(other))) {
                         best = Some((distance, slot, s, t));
                     }
                     // Rounded up, so that boxes at the same distance are still visited.
-                    (distance as f32) * (1.0 + 4.0 * f32::EPSILON)
+                    (distance as f32) / LIBRARY_UNIT * (1.0 + 4.0 * f32::EPSILON)
                 }
                 _ => f32::INFINITY,
             }
@@ -117,11 +130,11 @@ impl Bvh {
 
     fn blocked(&self, from: DVec3, to: DVec3, accept: impl Fn(u32, f64) -> bool) -> bool {
         let ray = Ray { origin: from, direction: to - from };
-        let hits = |slot: usize| {
-            intersect_triangle(&ray, self.triangles[slot]).is_some_and(|(d, ..)| accept(self.owners[slot], d))
-        };
+        let sheared = ShearedRay::new(&ray);
+        let hits =
+            |slot: usize| sheared.intersect(&self.triangles[slot]).is_some_and(|(d, ..)| accept(self.owners[slot], d));
         let missed =
-            self.bvh.ray_traverse_miss(library_ray(&ray, 1.0), |_, slot| if hits(slot) { 0.5 } else { f32::INFINITY });
+            self.bvh.ray_traverse_miss(library_ray(&ray, 1.0), |_, slot| if hits(slot) { 0.0 } else { f32::INFINITY });
         !missed
     }
 
@@ -147,18 +160,24 @@ impl Bvh {
     /// Calls `visit` with the id of every triangle below the boxes that `enters` takes, given by their lower and upper
     /// corners; in no particular order.
     pub fn within(&self, enters: impl Fn(DVec3, DVec3) -> bool, mut visit: impl FnMut(u32)) {
+        self.slots_within(enters, |slot| visit(self.owners[slot]));
+    }
+
+    fn slots_within(&self, enters: impl Fn(DVec3, DVec3) -> bool, mut visit: impl FnMut(usize)) {
         let mut open: Vec<u32> = if self.triangles.is_empty() { Vec::new() } else { vec![0] };
         while let Some(node) = open.pop() {
             let node = &self.bvh.nodes[node as usize];
-            let bounds = node.aabb();
-            if !enters(bounds.min.as_dvec3(), bounds.max.as_dvec3()) {
-                continue;
-            }
-            if node.is_leaf() {
-                let slots = node.first_index as usize..(node.first_index + node.prim_count) as usize;
-                self.owners[slots].iter().for_each(|&owner| visit(owner));
-            } else {
-                open.extend([node.first_index, node.first_index + 1]);
+            for child in (0..8).filter(|&child| !node.is_child_empty(child)) {
+                let bounds = node.child_aabb(child);
+                if !enters(bounds.min.as_dvec3(), bounds.max.as_dvec3()) {
+                    continue;
+                }
+                if node.is_leaf(child) {
+                    let (first, count) = node.child_primitives(child);
+                    (first..first + count).for_each(|slot| visit(slot as usize));
+                } else {
+                    open.push(node.child_node_index(child));
+                }
             }
         }
     }
@@ -168,24 +187,19 @@ impl Bvh {
     pub fn nearest_surface(&self, point: DVec3, normal: DVec3, reach: f64) -> Option<Hit> {
         let axis = normal.normalize_or_zero();
         let mut best: Option<(u32, Hit)> = None;
-        let around = Aabb::new((point - reach).as_vec3a(), (point + reach).as_vec3a());
-        self.bvh.aabb_traverse(around, |bvh, node| {
-            let node = &bvh.nodes[node as usize];
-            let slots = node.first_index as usize..(node.first_index + node.prim_count) as usize;
-            for slot in slots {
-                let (index, [a, b, c]) = (bvh.primitive_indices[slot], self.triangles[slot]);
-                let normal = (b - a).cross(c - a).normalize_or_zero();
-                if normal.dot(axis) < AGREEMENT {
-                    continue;
-                }
-                let (s, t) = nearest_barycentrics([a, b, c], point);
-                let distance = (a * (1.0 - s - t) + b * s + c * t).distance(point);
-                let nearer = |(other, hit): &(u32, Hit)| (distance, index) < (hit.distance, *other);
-                if distance <= reach && best.as_ref().is_none_or(nearer) {
-                    best = Some((index, Hit { id: self.owners[slot], distance, s, t, normal }));
-                }
+        let touches = |low: DVec3, high: DVec3| (point + reach).cmpge(low).all() && (point - reach).cmple(high).all();
+        self.slots_within(touches, |slot| {
+            let (index, [a, b, c]) = (self.bvh.primitive_indices[slot], self.triangles[slot]);
+            let normal = (b - a).cross(c - a).normalize_or_zero();
+            if normal.dot(axis) < AGREEMENT {
+                return;
             }
-            true
+            let (s, t) = nearest_barycentrics([a, b, c], point);
+            let distance = (a * (1.0 - s - t) + b * s + c * t).distance(point);
+            let nearer = |(other, hit): &(u32, Hit)| (distance, index) < (hit.distance, *other);
+            if distance <= reach && best.as_ref().is_none_or(nearer) {
+                best = Some((index, Hit { id: self.owners[slot], distance, s, t, normal }));
+            }
         });
         best.map(|(_, hit)| hit)
     }
@@ -214,8 +228,20 @@ fn nearest_barycentrics([a, b, c]: [DVec3; 3], point: DVec3) -> (f64, f64) {
     candidates.into_iter().min_by(|x, y| distance(*x).total_cmp(&distance(*y))).unwrap_or((0.0, 0.0))
 }
 
+/// A ray as the library walks boxes along it, as far as `farthest` lengths of the direction.
 fn library_ray(ray: &Ray, farthest: f32) -> obvhs::ray::Ray {
-    obvhs::ray::Ray::new(ray.origin.as_vec3a(), ray.direction.as_vec3a(), 0.0, farthest)
+    let least = (LEAST_COMPONENT * ray.direction.abs().max_element()).max(f64::MIN_POSITIVE);
+    let inverse = ray.direction.to_array().map(|component| {
+        let component = if component.abs() < least { least.copysign(component) } else { component };
+        (1.0 / component / f64::from(LIBRARY_UNIT)).clamp(-LARGEST_INVERSE, LARGEST_INVERSE) as f32
+    });
+    obvhs::ray::Ray {
+        origin: ray.origin.as_vec3a(),
+        direction: ray.direction.as_vec3a(),
+        inv_direction: Vec3A::from_array(inverse),
+        tmin: 0.0,
+        tmax: farthest / LIBRARY_UNIT,
+    }
 }
 
 #[cfg(test)]
@@ -243,30 +269,47 @@ mod tests {
             r
         };
         let point = |i: u32| DVec3::new(halton(i, 2), halton(i, 3), halton(i, 5));
-        let triangles: Vec<_> =
-            (0..300).map(|i| [0, 1, 2].map(|k| point(4 * i + 1) + 0.6 * point(4 * i + 2 + k))).collect();
-        let bvh = Bvh::of_triangles(triangles.clone());
         let mut hits = 0;
-        for i in 5000..6000 {
-            let origin = point(i) * 2.0 - 0.5;
-            let ray = Ray { origin, direction: point(i + 1000) * 1.5 - origin };
-            let all =
-                triangles.iter().enumerate().filter_map(|(id, t)| Some((intersect_triangle(&ray, *t)?.0, id as u32)));
-            let nearest = all.min_by(|a, b| a.0.total_cmp(&b.0));
-            let hit = bvh.closest_hit(&ray, 0.0);
-            assert_eq!(hit.map(|hit| (hit.distance, hit.id)), nearest);
-            let blocked = nearest.is_some_and(|(distance, _)| distance < 1.0);
-            assert_eq!(bvh.is_blocked(ray.origin, ray.at(1.0), 0.0), blocked);
-            if let Some(nearest) = nearest {
-                let others = |id| id != nearest.1;
-                let second = bvh.closest_hit(&ray, nearest.0);
-                assert_eq!(bvh.closest_hit_among(&ray, others), second);
-                let blocked = second.is_some_and(|hit| hit.distance < 1.0);
-                assert_eq!(bvh.is_blocked_among(ray.origin, ray.at(1.0), others), blocked);
+        for scale in [1.0, 1e-4, 1e5] {
+            let corner = |i: u32| (point(4 * i + 1), point(4 * i + 2), point(4 * i + 3), point(4 * i + 4));
+            let triangles: Vec<_> = (0..300)
+                .map(|i| {
+                    let (at, a, b, c) = corner(i);
+                    [a, b, c].map(|p| (at + 0.6 * p) * scale)
+                })
+                .collect();
+            let bvh = Bvh::of_triangles(triangles.clone());
+            for i in 5000..6000 {
+                let origin = (point(i) * 2.0 - 0.5) * scale;
+                let mut direction = point(i + 1000) * 1.5 * scale - origin;
+                if i % 10 == 0 {
+                    direction.x = 0.0;
+                }
+                let ray = Ray { origin, direction };
+                let sheared = ShearedRay::new(&ray);
+                let all = triangles
+                    .iter()
+                    .enumerate()
+                    .filter_map(|(id, triangle)| Some((sheared.intersect(triangle)?.0, id as u32)));
+                let nearest = all.min_by(|a, b| a.0.total_cmp(&b.0));
+                let hit = bvh.closest_hit(&ray, 0.0);
+                assert_eq!(hit.map(|hit| (hit.distance, hit.id)), nearest);
+                let blocked = nearest.is_some_and(|(distance, _)| distance < 1.0);
+                assert_eq!(bvh.is_blocked(ray.origin, ray.at(1.0), 0.0), blocked);
+                if let Some(nearest) = nearest {
+                    // From as near as a millionth of the way, which a hierarchy in f32 must not take for behind.
+                    let near = Ray { origin: ray.at(nearest.0 * (1.0 - 1e-6)), direction };
+                    assert_eq!(bvh.closest_hit(&near, 0.0).map(|hit| hit.id), Some(nearest.1));
+                    let others = |id| id != nearest.1;
+                    let second = bvh.closest_hit(&ray, nearest.0);
+                    assert_eq!(bvh.closest_hit_among(&ray, others), second);
+                    let blocked = second.is_some_and(|hit| hit.distance < 1.0);
+                    assert_eq!(bvh.is_blocked_among(ray.origin, ray.at(1.0), others), blocked);
+                }
+                hits += usize::from(nearest.is_some());
             }
-            hits += usize::from(nearest.is_some());
         }
-        assert!(hits > 300, "only {hits} rays hit anything");
+        assert!(hits > 900, "only {hits} rays hit anything");
     }
 
     #[test]

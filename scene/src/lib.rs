@@ -26,7 +26,7 @@ pub use half_edge::{HalfEdges, NO_TWIN};
 pub use interpolant::{Interpolant, SAMPLE_BARYCENTRICS};
 pub use material::Material;
 pub use polygon::{Plane, Polygon, area_vector, centroid, is_convex};
-pub use ray::{Ray, intersect_triangle};
+pub use ray::{Ray, ShearedRay};
 pub use rgb::{Rgb, luminance};
 pub use scene::{LARGEST_COORDINATE, Scene, SceneError, other_sides};
 pub use texture::Texture;

@@ -18,38 +18,57 @@ impl Ray {
     }
 }
 
-/// Where a ray meets the triangle (a, b, c), from either side: the distance and the barycentrics (s, t) of b and c.
+/// A ray in the space that is sheared so that the ray becomes the z axis through the origin: made once for all triangles
+/// that it is tried on.
 ///
 /// Watertight: a ray that hits the shared edge of two triangles hits at least one of them (Woop, Benthin and Wald,
 /// "Watertight Ray/Triangle Intersection", JCGT 2013; here in f64, where the edge functions of two triangles that
 /// share an edge are exact negatives of each other).
-pub fn intersect_triangle(ray: &Ray, [a, b, c]: [DVec3; 3]) -> Option<(f64, f64, f64)> {
-    let d = ray.direction;
-    // Shear space: the ray becomes the z axis through the origin, its largest component the divisor.
-    let z = if d.x.abs() > d.y.abs() && d.x.abs() > d.z.abs() {
-        0
-    } else if d.y.abs() > d.z.abs() {
-        1
-    } else {
-        2
-    };
-    let (x, y) = ((z + 1) % 3, (z + 2) % 3);
-    let (sx, sy, sz) = (d[x] / d[z], d[y] / d[z], 1.0 / d[z]);
-    let shear = |p: DVec3| {
-        let p = p - ray.origin;
-        (DVec2::new(p[x] - sx * p[z], p[y] - sy * p[z]), p[z] * sz)
-    };
-    let ((pa, za), (pb, zb), (pc, zc)) = (shear(a), shear(b), shear(c));
-    let (u, v, w) = (edge(pc, pb), edge(pa, pc), edge(pb, pa));
-    if (u < 0.0 || v < 0.0 || w < 0.0) && (u > 0.0 || v > 0.0 || w > 0.0) {
-        return None;
+#[derive(Clone, Copy, Debug)]
+pub struct ShearedRay {
+    origin: [f64; 3],
+    /// The axes, of which the last is the one along which the direction is largest: it is the divisor.
+    axes: [usize; 3],
+    shear: [f64; 3],
+}
+
+impl ShearedRay {
+    /// Prepares a ray.
+    pub fn new(ray: &Ray) -> Self {
+        let d = ray.direction;
+        let z = if d.x.abs() > d.y.abs() && d.x.abs() > d.z.abs() {
+            0
+        } else if d.y.abs() > d.z.abs() {
+            1
+        } else {
+            2
+        };
+        let (x, y) = ((z + 1) % 3, (z + 2) % 3);
+        Self { origin: ray.origin.to_array(), axes: [x, y, z], shear: [d[x] / d[z], d[y] / d[z], 1.0 / d[z]] }
     }
-    let sum = u + v + w;
-    if sum == 0.0 {
-        return None;
+
+    /// Where the ray meets the triangle (a, b, c), from either side: the distance and the barycentrics (s, t) of b and c.
+    #[inline]
+    pub fn intersect(&self, [a, b, c]: &[DVec3; 3]) -> Option<(f64, f64, f64)> {
+        let [x, y, z] = self.axes;
+        let [shear_x, shear_y, scale] = self.shear;
+        let sheared = |p: &DVec3| {
+            let p = p.to_array();
+            let depth = p[z] - self.origin[z];
+            (DVec2::new(p[x] - self.origin[x] - shear_x * depth, p[y] - self.origin[y] - shear_y * depth), depth)
+        };
+        let ((pa, za), (pb, zb), (pc, zc)) = (sheared(a), sheared(b), sheared(c));
+        let (u, v, w) = (edge(pc, pb), edge(pa, pc), edge(pb, pa));
+        if (u < 0.0 || v < 0.0 || w < 0.0) && (u > 0.0 || v > 0.0 || w > 0.0) {
+            return None;
+        }
+        let sum = u + v + w;
+        if sum == 0.0 {
+            return None;
+        }
+        let distance = (u * (za * scale) + v * (zb * scale) + w * (zc * scale)) / sum;
+        (distance > 0.0).then_some((distance, v / sum, w / sum))
     }
-    let distance = (u * za + v * zb + w * zc) / sum;
-    (distance > 0.0).then_some((distance, v / sum, w / sum))
 }
 
 /// Twice the signed area of (origin, p, q), exactly antisymmetric in its arguments.
@@ -64,10 +83,10 @@ mod tests {
     #[test]
     fn degenerate_triangles_are_missed() {
         let ray = Ray { origin: DVec3::ZERO, direction: DVec3::Z };
-        assert_eq!(intersect_triangle(&ray, [DVec3::Z; 3]), None);
-        assert_eq!(intersect_triangle(&ray, [DVec3::Z, DVec3::Z * 2.0, DVec3::Z * 3.0]), None);
+        assert_eq!(ShearedRay::new(&ray).intersect(&[DVec3::Z; 3]), None);
+        assert_eq!(ShearedRay::new(&ray).intersect(&[DVec3::Z, DVec3::Z * 2.0, DVec3::Z * 3.0]), None);
         let behind = [DVec3::new(-1., -1., -1.), DVec3::new(1., -1., -1.), DVec3::new(0., 1., -1.)];
-        assert_eq!(intersect_triangle(&ray, behind), None);
+        assert_eq!(ShearedRay::new(&ray).intersect(&behind), None);
     }
 
     #[test]
@@ -78,7 +97,7 @@ mod tests {
             for origin in [DVec3::ZERO, DVec3::new(3.0, 3.0, 9.0)] {
                 let ray = Ray { origin, direction: (point - origin) * 0.5 };
                 let (distance, hit_s, hit_t) =
-                    intersect_triangle(&ray, triangle).expect("the ray aims at the triangle");
+                    ShearedRay::new(&ray).intersect(&triangle).expect("the ray aims at the triangle");
                 assert!((distance - 2.0).abs() < 1e-12 && (hit_s - s).abs() < 1e-12 && (hit_t - t).abs() < 1e-12);
             }
         }
@@ -94,7 +113,8 @@ mod tests {
                 direction: p.lerp(q, f64::from(i) / 1000.0) - DVec3::new(0.01, 0.02, 0.0),
             };
             assert!(
-                intersect_triangle(&ray, [p, q, left]).is_some() || intersect_triangle(&ray, [q, p, right]).is_some()
+                ShearedRay::new(&ray).intersect(&[p, q, left]).is_some()
+                    || ShearedRay::new(&ray).intersect(&[q, p, right]).is_some()
             );
         }
     }
