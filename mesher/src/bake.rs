@@ -126,14 +126,18 @@ pub fn bake(scene: &Scene, solution: Solution, options: &BakeOptions, control: C
     (control.progress)(0.0);
     let found = all_discontinuities(scene, &solution, options.weight, min_weight);
     let reflectance = mean_reflectance(scene, &solution);
+    let by_rays = solution.visibility == Visibility::Rays;
+    // Without links elements are as small as they need to be at first.
+    let front = if by_rays { 0.0 } else { FRONT_LENGTH * scene.size() };
     let mut rounds = Rounds {
         scene,
         options,
         emitted: EmittedLight::default(),
-        reflected: ReflectedLight::new(&solution, FRONT_LENGTH * scene.size()),
+        reflected: ReflectedLight::new(&solution, front),
         mean: colour_mean(solution.mean_irradiance),
+        is_guessed: by_rays,
         found,
-        share: if solution.visibility == Visibility::Rays { FIRST_SHARE_BY_RAYS } else { FIRST_SHARE },
+        share: if by_rays { FIRST_SHARE_BY_RAYS } else { FIRST_SHARE },
         source_share: FIRST_SOURCE_SHARE,
         reflectance,
         reflected_errors: Vec::new(),

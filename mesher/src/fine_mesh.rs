@@ -8,7 +8,7 @@ use std::collections::HashMap;
 use glam::DVec3;
 use rayon::prelude::*;
 use scene::{DiscontinuityLine, Rgb, Scene};
-use solver::{Gather, NodeId, Solution};
+use solver::{Gather, NodeId, Shafts, Solution};
 
 use crate::probe::{colour_mean, probe_point};
 use crate::samples::QueryKey;
@@ -37,7 +37,11 @@ pub(crate) struct FineMesh {
 
 /// Irradiance from emitters at every point that was asked for so far, W·m⁻²: from mesh to mesh most stay.
 #[derive(Default)]
-pub(crate) struct EmittedLight(HashMap<QueryKey, Rgb>);
+pub(crate) struct EmittedLight {
+    light: HashMap<QueryKey, Rgb>,
+    /// By leaf.
+    shafts: HashMap<NodeId, Shafts>,
+}
 
 impl FineMesh {
     /// Meshes the solution's leaves with the `count` strongest discontinuities of each. An emitter that sends less than `dim` of
@@ -60,6 +64,7 @@ impl FineMesh {
         let stands_in = |query: &SampleQuery| middle_of_small(solution, query, small).unwrap_or(*query);
         let queries: Vec<SampleQuery> = fine.table.queries.iter().map(stands_in).collect();
         known.find(&gather, queries.iter().chain(&probes));
+        known.shafts.retain(|&element, _| solution.elements.is_leaf(element));
         fine.emitted = known.at(&queries);
         fine.probed = known.at(&probes);
         fine
@@ -100,22 +105,26 @@ impl FineMesh {
 impl EmittedLight {
     /// Evaluates what is not known yet, each leaf's points together.
     fn find<'a>(&mut self, gather: &Gather<'_>, queries: impl Iterator<Item = &'a SampleQuery>) {
-        let mut unknown: Vec<&SampleQuery> = queries.filter(|query| !self.0.contains_key(&query.key())).collect();
+        let mut unknown: Vec<&SampleQuery> = queries.filter(|query| !self.light.contains_key(&query.key())).collect();
         unknown.sort_by_key(|query| query.element);
         unknown.dedup_by_key(|query| query.key());
         let groups: Vec<&[&SampleQuery]> = unknown.chunk_by(|a, b| a.element == b.element).collect();
-        let found: Vec<Vec<Rgb>> = groups
+        let found: Vec<(Vec<Rgb>, Shafts)> = groups
             .par_iter()
             .map(|group| {
-                let leaf = gather.over_emitters(group[0].element);
-                group.iter().map(|query| leaf.emitted(query.position, query.inward)).collect()
+                let mut shafts = self.shafts.get(&group[0].element).cloned().unwrap_or_default();
+                let leaf = gather.over_emitters(group[0].element, &mut shafts);
+                (group.iter().map(|query| leaf.emitted(query.position, query.inward)).collect(), shafts)
             })
             .collect();
-        self.0.extend(unknown.iter().map(|query| query.key()).zip(found.into_iter().flatten()));
+        for (group, (values, shafts)) in groups.into_iter().zip(found) {
+            self.shafts.insert(group[0].element, shafts);
+            self.light.extend(group.iter().map(|query| query.key()).zip(values));
+        }
     }
 
     fn at(&self, queries: &[SampleQuery]) -> Vec<Rgb> {
-        queries.par_iter().map(|query| self.0[&query.key()]).collect()
+        queries.par_iter().map(|query| self.light[&query.key()]).collect()
     }
 }
 

@@ -13,7 +13,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use rayon::prelude::*;
 use scene::{Bvh, Interpolant, Ray, Rgb, Scene, other_sides};
-use solver::{Gather, NodeId, SeenNode, Solution, Visibility, hemisphere};
+use solver::{Gather, NodeId, SeenNode, Shafts, Solution, Visibility, hemisphere};
 
 use crate::fine_mesh::FineMesh;
 use crate::probe::{at, colour_mean};
@@ -138,7 +138,7 @@ fn residual_by_rays(
         .map(|(triangle, s, t)| {
             let leaf = &fine.leaves[fine.mesh.triangles[triangle].leaf as usize];
             let position = at(fine.corners(triangle), (s, t));
-            let emitted = halves[0].over_emitters(leaf.element).emitted(position, DVec3::ZERO);
+            let emitted = halves[0].over_emitters(leaf.element, &mut Shafts::default()).emitted(position, DVec3::ZERO);
             let halves = halves.each_ref().map(|half| {
                 let mut seen = Vec::new();
                 half.seen_by_rays(leaf.polygon, position, DVec3::ZERO, &mut seen);

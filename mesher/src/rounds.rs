@@ -18,8 +18,10 @@ const AIM: f64 = 0.6;
 /// Meshes in one round at most. Each divides what the last one found wanting.
 const MESHES: u32 = 12;
 
-/// The same where reflected light is found by rays: what is left after some is chance.
+/// The same where reflected light is found by rays, unless what is left to divide is less than a part of all leaves: a few are
+/// found wanting for what they are, many by chance.
 const MESHES_BY_RAYS: u32 = 4;
+const FEW: usize = 50;
 
 /// Leaves with a cell shorter than this fraction of the scene's size are not divided: at a corner of contact the error falls
 /// no faster than its area.
@@ -32,6 +34,9 @@ const RESIDUAL_SHARE: f64 = 0.02;
 /// An emitter that sends less than this part of the tolerance to a point is dim there.
 const DIM: f64 = 0.5;
 
+/// The part of its guess that a scene's mean irradiance may turn out to be without light being found anew. Less scatters more.
+const BELOW_GUESS: f64 = 0.5;
+
 /// What goes from round to round.
 pub(crate) struct Rounds<'a> {
     pub scene: &'a Scene,
@@ -42,6 +47,8 @@ pub(crate) struct Rounds<'a> {
     pub reflected: ReflectedLight,
     /// Mean irradiance of all surfaces, averaged over the colours, W·m⁻².
     pub mean: f64,
+    /// Whether that is but a guess.
+    pub is_guessed: bool,
     /// The share of the tolerance that each of the two kinds of light may use up in this round.
     pub share: f64,
     /// The part of the tolerance that a row may misplace on account of each reflector.
@@ -59,8 +66,7 @@ impl Rounds<'_> {
         if !self.solution.reflects() {
             return fine;
         }
-        let meshes = if self.solution.visibility == Visibility::Rays { MESHES_BY_RAYS } else { MESHES };
-        for last in (0..meshes).rev() {
+        for mesh in 1..=MESHES {
             let exchange = Exchange {
                 source_error: self.source_share * self.options.tolerance,
                 residual: RESIDUAL_SHARE * self.options.tolerance * self.mean * (1.0 - self.reflectance),
@@ -81,7 +87,10 @@ impl Rounds<'_> {
                 })
                 .collect();
             let divided = self.wanting(&leaves);
-            if divided.is_empty() || last == 0 || fine.triangles() > self.options.max_triangles {
+            let by_chance = self.solution.visibility == Visibility::Rays
+                && mesh >= MESHES_BY_RAYS
+                && divided.len() * FEW > leaves.len();
+            if divided.is_empty() || by_chance || mesh == MESHES || fine.triangles() > self.options.max_triangles {
                 break;
             }
             if self.reflected.divide(&mut self.solution, &divided) {
@@ -126,12 +135,18 @@ impl Rounds<'_> {
     /// Divides leaves until light from emitters is interpolated well enough.
     fn mesh_emitted(&mut self) -> FineMesh {
         let mut fine = self.fine_mesh();
-        if self.solution.visibility == Visibility::Rays && self.mean == 0.0 {
+        if std::mem::take(&mut self.is_guessed) {
+            let guess = self.mean;
             self.take_means(&fine, &fine.emitted);
             // Nothing is known of reflected light yet but that there is as much as a closed room has.
             let bounces = if self.solution.reflects() { 1.0 / (1.0 - self.reflectance) } else { 1.0 };
             self.mean *= bounces;
             self.solution.mean_irradiance *= bounces;
+            // What was faint beside the guess may not be so beside this.
+            if self.mean < BELOW_GUESS * guess {
+                self.emitted = EmittedLight::default();
+                fine = self.fine_mesh();
+            }
         }
         for _ in 0..MESHES {
             let mut leaves: Vec<(NodeId, f64)> = fine.leaves.iter().map(|leaf| (leaf.element, 0.0)).collect();

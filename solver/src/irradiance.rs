@@ -15,14 +15,14 @@ use scene::{Rgb, Scene, luminance};
 
 use crate::clip::{Position, locate};
 use crate::emitter::{Emitter, emitters};
-use crate::form_factor::form_factor_at;
+use crate::emitter_tree::EmitterTree;
 use crate::geometry::Geometry;
 use crate::leaf_gather::{LeafGather, SeenNode, Source};
 use crate::polygon_tree::PolygonTree;
 use crate::ray_gather::{RayGather, rays_for};
+use crate::shafts::Shafts;
 use crate::solid::Solids;
 use crate::solution::{Solution, Visibility};
-use crate::visibility::{Shaft, facing_parts};
 use crate::{LinkSource, NodeId};
 
 /// How much light one reflector may misplace at a point, as a fraction of the scene's mean irradiance, where nothing else is
@@ -31,14 +31,6 @@ const SOURCE_ERROR: f64 = 1e-3;
 
 /// What nodes may misplace where a bake is checked by other rays, as a part of what they may in the bake.
 const SMALLER: f64 = 0.25;
-
-/// An emitter that sends less than this part of the budget to an element's middle is faint there: nobody looks for what stands
-/// before it, and a few rays tell. Halls have lamps by the hundred, of which a point sees a dozen.
-const FAINT: f64 = 0.2;
-
-/// Polygons whose boxes reach into the shaft to an emitter, at most, that are looked at one by one. Behind more, rays will tell
-/// what is seen of it in any case.
-const MOST_CANDIDATES: usize = 160;
 
 /// How other polygons touch a point of a polygon: how many values irradiance has there.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -62,6 +54,8 @@ pub struct Gather<'a> {
     pub(crate) solids: Solids,
     pub(crate) tree: PolygonTree,
     pub(crate) emitters: Vec<Emitter>,
+    /// Where there are no links to say which emitters an element sees.
+    emitter_tree: Option<EmitterTree>,
     /// Prepared when a point asks for reflectors first, in a scene where rays find them.
     rays: OnceLock<RayGather>,
     /// Rays from a point, and their turn.
@@ -129,7 +123,14 @@ impl<'a> Gather<'a> {
         let solids = Solids::new(scene, &geometry);
         let emitters = emitters(scene);
         let tree = PolygonTree::new(scene);
-        Self { scene, solution, geometry, solids, tree, emitters, rays: OnceLock::new(), sampling, opening, radiosity }
+        let emitter_tree = (solution.visibility == Visibility::Rays).then(|| EmitterTree::new(scene, &emitters));
+        let rays = OnceLock::new();
+        Self { scene, solution, geometry, solids, tree, emitters, emitter_tree, rays, sampling, opening, radiosity }
+    }
+
+    /// The emitters, in a scene without links.
+    pub(crate) fn emitter_tree(&self) -> Option<&EmitterTree> {
+        self.emitter_tree.as_ref()
     }
 
     /// Rays over the solution's elements, where they stand in for links.
@@ -190,12 +191,10 @@ impl<'a> Gather<'a> {
 
     /// A gather for the points in the closure of one element.
     pub fn over(&'a self, element: NodeId) -> LeafGather<'a> {
-        self.over_sources(element, |_| true)
-    }
-
-    /// The same for light from emitters alone.
-    pub fn over_emitters(&'a self, element: NodeId) -> LeafGather<'a> {
-        self.over_sources(element, |polygon| self.scene.material(polygon).emits())
+        match self.emitter_tree {
+            Some(_) => self.over_shafts(element, &mut Shafts::default()),
+            None => self.over_sources(element, |_| true),
+        }
     }
 
     /// How much light, luminance, W·m⁻², the plane over a reflector's node misplaces at a point with the given form factor to
@@ -238,10 +237,7 @@ impl<'a> Gather<'a> {
         form_factor * self.radiosity[polygon as usize] <= self.budget()
     }
 
-    fn over_sources(&'a self, element: NodeId, wanted: impl Fn(u32) -> bool) -> LeafGather<'a> {
-        if self.solution.visibility == Visibility::Rays {
-            return self.over_shafts(element);
-        }
+    pub(crate) fn over_sources(&'a self, element: NodeId, wanted: impl Fn(u32) -> bool) -> LeafGather<'a> {
         let (solution, elements) = (self.solution, &self.solution.elements);
         let area = elements.nodes[element as usize].area;
         let mut links: Vec<LinkSummary> = Vec::new();
@@ -285,56 +281,8 @@ impl<'a> Gather<'a> {
         blockers.sort_unstable();
         blockers.dedup();
         let polygon = elements.polygon_of(element).unwrap_or_default();
-        LeafGather { gather: self, polygon, centre: elements.nodes[element as usize].centre, sources, blockers }
-    }
-
-    /// A gather whose sources are all emitters that an element faces, each with what stands in the shaft between the two.
-    fn over_shafts(&'a self, element: NodeId) -> LeafGather<'a> {
-        let elements = &self.solution.elements;
-        let polygon = elements.polygon_of(element).unwrap_or_default();
-        let (outline, plane) = (elements.outline(element), self.geometry.plane(polygon));
-        let tolerance = self.geometry.contact_tolerance;
-        let blockers = |emitter: &Emitter| {
-            let is_other = |blocker: &u32| *blocker != polygon && emitter.polygons.binary_search(blocker).is_err();
-            let found = if emitter.body.is_empty() {
-                let source = emitter.polygons[0];
-                let (source, facing) = (self.geometry.outline(source), self.geometry.plane(source));
-                let [near, far] = facing_parts(outline, &plane, source, &facing, tolerance)?;
-                self.tree.in_shaft(&self.geometry, &Shaft::between(&near, &far), MOST_CANDIDATES)
-            } else if emitter.body.iter().any(|&corner| plane.distance(corner) > tolerance) {
-                self.tree.in_shaft(&self.geometry, &Shaft::towards(outline, &emitter.body), MOST_CANDIDATES)
-            } else {
-                None
-            };
-            found.map(|found| found.into_iter().filter(is_other).collect::<Vec<u32>>())
-        };
         let centre = elements.nodes[element as usize].centre;
-        let is_faint = |emitter: &Emitter| {
-            let source = emitter.polygons[0];
-            let form_factor = form_factor_at(centre, plane.normal, self.geometry.outline(source));
-            let irradiance = luminance(form_factor * self.scene.material(source).exitance());
-            emitter.body.is_empty() && irradiance <= FAINT * self.budget()
-        };
-        let source = |(number, emitter): (usize, &Emitter)| {
-            if emitter.polygons.binary_search(&polygon).is_ok() {
-                return None; // Convex: no part of it sees another.
-            }
-            if is_faint(emitter) {
-                let polygon = emitter.polygons[0];
-                let before = OnceCell::new();
-                return Some(Source { polygon, body: None, roots: Vec::new(), part: None, blockers: None, before });
-            }
-            let blockers = Some(blockers(emitter)?);
-            let body = (!emitter.body.is_empty()).then_some(number as u32);
-            let polygon = emitter.polygons[0];
-            Some(Source { polygon, body, roots: Vec::new(), part: None, blockers, before: OnceCell::new() })
-        };
-        let sources: Vec<Source> = self.emitters.iter().enumerate().filter_map(source).collect();
-        let mut blockers: Vec<u32> =
-            sources.iter().filter_map(|source| source.blockers.as_ref()).flatten().copied().collect();
-        blockers.sort_unstable();
-        blockers.dedup();
-        LeafGather { gather: self, polygon, centre: elements.nodes[element as usize].centre, sources, blockers }
+        LeafGather { gather: self, polygon, centre, sources, groups: Vec::new(), blockers }
     }
 
     /// A source polygon by all links from it.

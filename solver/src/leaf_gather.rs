@@ -19,8 +19,7 @@ use crate::blocker::Blocker;
 use crate::clip::clip_convex;
 use crate::emitter::outline_of;
 use crate::form_factor::{form_factor_at, point_form_factor};
-use crate::ray_gather::{ASIDE, shift, spread_over};
-use crate::{Gather, NodeId, Visibility};
+use crate::{Gather, NodeId};
 
 /// The part of a source's form factor from which on nothing is taken to hide it: above the rounding of its clipping.
 const WHOLE: f64 = 1.0 - 1e-9;
@@ -32,10 +31,6 @@ const CURVATURE: f64 = 2.0;
 /// Obstacles before a source at most that are projected one by one, in a scene of too many polygons for links; past more,
 /// rays tell what is seen of it. Less leaves penumbrae to rays that exact ones would be had for.
 const MOST_OBSTACLES: usize = 24;
-
-/// Rays that tell what is seen of a source: of one that is faint, of one that is dim at the point, and of a bright one. To stop early where the first few agree would take what is mostly seen for seen
-/// wholly.
-const SHARE_RAYS: [u32; 3] = [2, 9, 25];
 
 /// Six points that integrate a polynomial of degree 4 over a triangle: weights, and barycentrics of which the second counts
 /// twice (Dunavant, "High Degree Efficient Symmetrical Gaussian Quadrature Rules for the Triangle", 1985). A point a
@@ -52,6 +47,8 @@ pub struct LeafGather<'a> {
     /// Centre of the element, metres.
     pub(crate) centre: DVec3,
     pub(crate) sources: Vec<Source>,
+    /// Groups of emitters that are faint here, in a scene without links.
+    pub(crate) groups: Vec<u32>,
     /// All blockers of all sources, ascending.
     pub(crate) blockers: Vec<u32>,
 }
@@ -66,7 +63,7 @@ pub(crate) struct Source {
     pub roots: Vec<(NodeId, f64)>,
     /// The root, if it stands for one patch of several alone.
     pub part: Option<NodeId>,
-    /// Polygons that may hide it, ascending; none if it is too faint for them to be looked for.
+    /// Polygons that may hide it, ascending; none if rays tell what is seen of it.
     pub blockers: Option<Vec<u32>>,
     /// The same as they are before the source: found out when a point needs them first, since most sources are too dim for
     /// that.
@@ -196,12 +193,13 @@ impl LeafGather<'_> {
         };
         fragments.start(cone.corners(), from.up);
         let obstacles = source.before.get_or_init(|| self.before(source));
-        if obstacles.len() > MOST_OBSTACLES {
+        if source.blockers.is_none() || obstacles.len() > MOST_OBSTACLES {
             let unoccluded = fragments.measure(from.up);
             let distance = emitter.body[0].distance(from.position);
             let outline: Vec<DVec3> = cone.corners().iter().map(|corner| from.position + corner * distance).collect();
             let passes = |polygon: u32| emitter.polygons.binary_search(&polygon).is_ok();
-            return unoccluded * self.seen_share(&outline, SHARE_RAYS[2], from, passes);
+            let irradiance = luminance(unoccluded * self.gather.scene.material(source.polygon).exitance());
+            return unoccluded * self.seen_share(&outline, irradiance, from, passes);
         }
         for obstacle in obstacles {
             if fragments.is_empty() {
@@ -210,31 +208,6 @@ impl LeafGather<'_> {
             self.subtract(obstacle, from, cones, fragments);
         }
         fragments.measure(from.up)
-    }
-
-    /// The share of what an outline sends to a point that arrives there, by rays to points spread evenly over it.
-    fn seen_share(&self, outline: &[DVec3], rays: u32, from: &Viewpoint, passes: impl Fn(u32) -> bool) -> f64 {
-        let gather = self.gather;
-        let origin = from.position + from.inward * (ASIDE * gather.geometry.size);
-        let normal = scene::area_vector(outline).normalize_or_zero();
-        let areas: Vec<f64> =
-            outline[1..].windows(2).map(|edge| (edge[0] - outline[0]).cross(edge[1] - outline[0]).length()).collect();
-        let total: f64 = areas.iter().sum();
-        let shift = shift(from.position, 0);
-        let (mut seen, mut all) = (0.0, 0.0);
-        for i in 0..rays {
-            let place = spread_over(outline, &areas, total, shift, i);
-            let way = place - origin;
-            let square = way.length_squared();
-            let weight = from.up.dot(way).max(0.0) * normal.dot(way).abs() / (square * square).max(f64::MIN_POSITIVE);
-            if weight > 0.0 {
-                all += weight;
-                if !gather.tree.is_blocked(self.polygon, origin, place, &passes) {
-                    seen += weight;
-                }
-            }
-        }
-        if all > 0.0 { seen / all } else { 0.0 }
     }
 
     /// Cuts away what an obstacle hides from a point. `cones` are those that the point has needed so far, by number.
@@ -308,14 +281,12 @@ impl LeafGather<'_> {
                 continue;
             }
             let obstacles = source.before.get_or_init(|| self.before(source));
-            let is_faint = source.blockers.is_none();
-            let is_hidden = !obstacles.is_empty() || is_faint;
-            if is_hidden && !touches && self.gather.solution.visibility == Visibility::Rays {
+            let by_rays = source.blockers.is_none();
+            if (by_rays || !obstacles.is_empty()) && !touches && gather.emitter_tree().is_some() {
                 let unoccluded = fragments.measure(up);
-                let is_dim = luminance(unoccluded * material.exitance()) <= self.gather.budget();
-                if is_faint || is_dim || obstacles.len() > MOST_OBSTACLES {
-                    let rays = SHARE_RAYS[if is_faint { 0 } else { 1 + usize::from(!is_dim) }];
-                    let share = self.seen_share(outline, rays, &from, |polygon| polygon == source.polygon);
+                let irradiance = luminance(unoccluded * material.exitance());
+                if by_rays || irradiance <= gather.budget() || obstacles.len() > MOST_OBSTACLES {
+                    let share = self.seen_share(outline, irradiance, &from, |polygon| polygon == source.polygon);
                     total += share * unoccluded * material.exitance();
                     continue;
                 }
@@ -339,6 +310,9 @@ impl LeafGather<'_> {
                     self.see_fragments(source, &fragments, &from, seen);
                 }
             }
+        }
+        if wanted != Light::Reflected {
+            total += self.from_faint_groups(&from);
         }
         total
     }

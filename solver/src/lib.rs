@@ -11,9 +11,11 @@ mod contour;
 mod cut;
 mod element;
 mod emitter;
+mod emitter_tree;
 mod form_factor;
 mod geometry;
 mod irradiance;
+mod lamp_rays;
 mod leaf_gather;
 mod linear_fit;
 mod oracle;
@@ -21,6 +23,7 @@ mod polygon_tree;
 mod quadrature;
 mod ray_gather;
 mod refine;
+mod shafts;
 mod solid;
 mod solution;
 mod solve;
@@ -36,6 +39,7 @@ pub use form_factor::{exchange, form_factor, form_factor_at, point_form_factor};
 pub use irradiance::{Contact, Gather};
 pub use leaf_gather::{LeafGather, SeenNode};
 pub use ray_gather::hemisphere;
+pub use shafts::Shafts;
 pub use solution::{
     BlockerLists, Convergence, Cut, ElementLight, Interaction, Link, LinkSource, Solution, SolveOptions, Visibility,
 };

@@ -6,6 +6,21 @@ use scene::{Bvh, Scene, other_sides};
 use crate::geometry::Geometry;
 use crate::visibility::{Occlusion, Shaft};
 
+/// What stands in a shaft.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Stands {
+    /// These polygons, ascending; what each hides is for a point to find out.
+    Some(Vec<u32>),
+    /// Too many to look at each.
+    Many,
+    /// So much that nothing passes.
+    All,
+}
+
+/// Polygons whose boxes reach into a shaft, at most, that are looked at one by one. Behind more, rays will tell what is seen
+/// in any case.
+const MOST_CANDIDATES: usize = 160;
+
 /// A bounding volume hierarchy over the polygons of a scene.
 pub struct PolygonTree {
     bvh: Bvh,
@@ -24,23 +39,19 @@ impl PolygonTree {
         self.ascending(|low, high| (point + reach).cmpge(low).all() && (point - reach).cmple(high).all())
     }
 
-    /// Polygons that stand in a shaft, ascending; none if one of them fills it, so that nothing passes. Where the boxes of more
-    /// than `most` reach into it, all of these.
-    pub fn in_shaft(&self, geometry: &Geometry, shaft: &Shaft<'_>, most: usize) -> Option<Vec<u32>> {
+    /// What stands in a shaft.
+    pub fn in_shaft(&self, geometry: &Geometry, shaft: &Shaft<'_>) -> Stands {
         let mut found = self.ascending(|low, high| shaft.may_enter(low, high));
-        if found.len() > most {
-            return Some(found);
+        if found.len() > MOST_CANDIDATES {
+            return Stands::Many;
         }
-        let mut total = false;
-        found.retain(|&polygon| match shaft.classify(geometry.outline(polygon)) {
-            Occlusion::Clear => false,
-            Occlusion::Partial => true,
-            Occlusion::Total => {
-                total = true;
-                true
-            }
+        let mut is_total = false;
+        found.retain(|&polygon| {
+            let occlusion = shaft.classify(geometry.outline(polygon));
+            is_total |= occlusion == Occlusion::Total;
+            occlusion != Occlusion::Clear
         });
-        (!total).then_some(found)
+        if is_total { Stands::All } else { Stands::Some(found) }
     }
 
     /// Whether a polygon stands between a point of a polygon and another point, apart from the polygon, its other side, and

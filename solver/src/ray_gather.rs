@@ -16,7 +16,7 @@ use crate::leaf_gather::SeenNode;
 use crate::{NodeId, Patch, Solution};
 
 /// The powers of the plastic number, whose multiples fill the square evenly (Roberts 2018).
-const STEP: [f64; 2] = [0.754_877_666_246_692_8, 0.569_840_290_998_053_3];
+pub(crate) const STEP: [f64; 2] = [0.754_877_666_246_692_8, 0.569_840_290_998_053_3];
 
 /// Rays from a point for a source error of `RAYS_ERROR`. What rays that are spread evenly miss falls with their number to the
 /// power of −3/4.

@@ -16,6 +16,13 @@ const RELATIVE_LINK_ERROR: f64 = 0.2;
 /// that has adapted to it sees what one quadratic over all of it leaves out.
 const LARGEST_CELL: f64 = 0.1;
 
+/// Side of a square element that is as large as one may be without links, where nothing is known of its light before it is
+/// looked at: as a part of the area of all surfaces. Larger misses what lies between its probes.
+const LARGEST_SHARE: f64 = 1.0 / 1500.0;
+
+/// The part of its light that a room is taken to absorb at least, where its light is guessed.
+const LEAST_ABSORBED: f64 = 0.05;
+
 /// Times that links are refined by the light of the transport before. The first has seen patches only, the second
 /// elements; later ones hardly change a link.
 const REFINEMENTS: u32 = 3;
@@ -90,7 +97,8 @@ fn unlinked(
     options: &SolveOptions,
 ) -> Solution {
     let mut elements = Elements::new(pieces);
-    elements.divide_larger(scene.size() * LARGEST_CELL);
+    let area: f64 = scene.polygon_ids().map(|polygon| scene.area(polygon)).sum();
+    elements.divide_larger((area * LARGEST_SHARE).sqrt().min(scene.size() * LARGEST_CELL));
     let dark = vec![ElementLight::default(); elements.nodes.len()];
     Solution {
         first_link: vec![0; elements.nodes.len() + 1],
@@ -102,12 +110,23 @@ fn unlinked(
         irradiance: dark.clone(),
         direct: dark.clone(),
         light: dark,
-        mean_irradiance: Rgb::ZERO,
+        mean_irradiance: guessed_irradiance(scene),
         convergence: Convergence { reached: true, ..Convergence::default() },
         link_error: 0.0,
         bounces: options.bounces,
         visibility: Visibility::Rays,
     }
+}
+
+/// Mean irradiance of a closed room with the scene's lamps and walls, W·m⁻²: light that escapes, and lamps that shine where few
+/// surfaces are, make it less.
+fn guessed_irradiance(scene: &Scene) -> Rgb {
+    let sum =
+        |of: &dyn Fn(u32) -> Rgb| scene.polygon_ids().map(|polygon| of(polygon) * scene.area(polygon)).sum::<Rgb>();
+    let area = sum(&|_| Rgb::ONE);
+    let emitted = sum(&|polygon| scene.material(polygon).exitance());
+    let absorbed = sum(&|polygon| Rgb::ONE - scene.reflectance(polygon));
+    if area.x > 0.0 { emitted / absorbed.max(area * LEAST_ABSORBED) } else { Rgb::ZERO }
 }
 
 /// What refinement goes by: radiosity as a source, and how far it varies below each node.
