@@ -20,7 +20,7 @@ pub(crate) const STEP: [f64; 2] = [0.754_877_666_246_692_8, 0.569_840_290_998_05
 
 /// Rays from a point for a source error of `RAYS_ERROR`. What rays that are spread evenly miss falls with their number to the
 /// power of −3/4.
-const RAYS: f64 = 128.0;
+const RAYS: f64 = 256.0;
 const RAYS_ERROR: f64 = 0.0036;
 
 /// What a single ray would be off by, relative to the light over reflectors: a guess that suits a furnished room, not a measured
@@ -53,7 +53,7 @@ const NEGLIGIBLE: f64 = 2.0;
 
 /// Rays that tell what is hidden of a node, at least: of a dim one and of a bright one. A large node gets as many as would meet
 /// it of those over the hemisphere. To stop early where the first agree would take what is mostly seen for seen wholly.
-const AIMED_RAYS: [u32; 2] = [1, 2];
+const AIMED_RAYS: [u32; 2] = [2, 4];
 
 /// Where rays start: a position just in front of all that touches it, on a polygon.
 struct Origin {
