@@ -219,14 +219,11 @@ impl ReflectedLight {
         let found: Vec<Vec<Row>> = groups
             .par_iter()
             .map(|group| {
-                let element = (solution.visibility == Visibility::Links).then(|| gather.over(group[0].element));
+                let element = gather.over_reflectors(group[0].element);
                 let mut seen = Vec::new();
                 let row = |query: &&SampleQuery| {
                     seen.clear();
-                    match &element {
-                        Some(element) => element.seen_nodes(query.position, query.inward, &mut seen),
-                        None => gather.seen_by_rays(query.polygon, query.position, query.inward, &mut seen),
-                    }
+                    element.seen_nodes(query.position, query.inward, &mut seen);
                     seen.iter().map(Seen::from).collect()
                 };
                 group.iter().map(row).collect()

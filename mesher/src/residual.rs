@@ -141,7 +141,7 @@ fn residual_by_rays(
             let emitted = halves[0].over_emitters(leaf.element, &mut Shafts::default()).emitted(position, DVec3::ZERO);
             let halves = halves.each_ref().map(|half| {
                 let mut seen = Vec::new();
-                half.seen_by_rays(leaf.polygon, position, DVec3::ZERO, &mut seen);
+                half.over_reflectors(leaf.element).seen_nodes(position, DVec3::ZERO, &mut seen);
                 emitted + half.irradiance_from(&seen)
             });
             let baked = Interpolant::through(fine.table.triangles[triangle].map(|sample| samples[sample as usize]))

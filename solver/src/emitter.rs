@@ -2,9 +2,10 @@
 //! outline, evenly bright; so a bulb of hundreds of triangles is one source.
 
 use glam::{DVec2, DVec3};
-use scene::{HalfEdges, NO_TWIN, Plane, Scene};
+use scene::{HalfEdges, NO_TWIN, Plane, Scene, luminance};
 
 use crate::backprojection::BlockerCone;
+use crate::light_tree::{Light, LightTree};
 
 /// How far a corner may rise over the plane of a face, as a fraction of the body's diagonal: the digits that files keep bend
 /// round bodies by about as much. Larger takes dents for convex.
@@ -50,6 +51,22 @@ pub fn emitters(scene: &Scene) -> Vec<Emitter> {
     }
     emitters.sort_by_key(|emitter| emitter.polygons[0]);
     emitters
+}
+
+/// The hierarchy over emitters, whose lights are numbered as these and whose surfaces are polygons.
+pub fn emitter_tree(scene: &Scene, emitters: &[Emitter]) -> LightTree {
+    let power = |polygon: u32| luminance(scene.material(polygon).exitance()) * scene.area(polygon);
+    let light = |emitter: &Emitter| {
+        let [first, ..] = emitter.polygons[..] else { return None };
+        if emitter.body.is_empty() {
+            return Some(Light::of_outline(&scene.outline(first), scene.plane(first).normal, first, power(first)));
+        }
+        let low = emitter.body.iter().copied().fold(DVec3::INFINITY, DVec3::min);
+        let high = emitter.body.iter().copied().fold(DVec3::NEG_INFINITY, DVec3::max);
+        let surfaces = emitter.polygons.iter().map(|&polygon| (polygon, power(polygon))).collect();
+        Some(Light { low, high, axis: None, surfaces })
+    };
+    LightTree::new(&emitters.iter().filter_map(light).collect::<Vec<Light>>())
 }
 
 /// The corners of the convex body that polygons close; none if they do not.

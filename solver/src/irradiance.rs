@@ -14,10 +14,10 @@ use glam::DVec3;
 use scene::{Rgb, Scene, luminance};
 
 use crate::clip::{Position, locate};
-use crate::emitter::{Emitter, emitters};
-use crate::emitter_tree::EmitterTree;
+use crate::emitter::{Emitter, emitter_tree, emitters};
 use crate::geometry::Geometry;
 use crate::leaf_gather::{LeafGather, SeenNode, Source};
+use crate::light_tree::LightTree;
 use crate::polygon_tree::PolygonTree;
 use crate::ray_gather::{RayGather, rays_for};
 use crate::shafts::Shafts;
@@ -55,7 +55,7 @@ pub struct Gather<'a> {
     pub(crate) tree: PolygonTree,
     pub(crate) emitters: Vec<Emitter>,
     /// Where there are no links to say which emitters an element sees.
-    emitter_tree: Option<EmitterTree>,
+    emitter_tree: Option<LightTree>,
     /// Prepared when a point asks for reflectors first, in a scene where rays find them.
     rays: OnceLock<RayGather>,
     /// Rays from a point, and their turn.
@@ -123,13 +123,13 @@ impl<'a> Gather<'a> {
         let solids = Solids::new(scene, &geometry);
         let emitters = emitters(scene);
         let tree = PolygonTree::new(scene);
-        let emitter_tree = (solution.visibility == Visibility::Rays).then(|| EmitterTree::new(scene, &emitters));
+        let emitter_tree = (solution.visibility == Visibility::Rays).then(|| emitter_tree(scene, &emitters));
         let rays = OnceLock::new();
         Self { scene, solution, geometry, solids, tree, emitters, emitter_tree, rays, sampling, opening, radiosity }
     }
 
     /// The emitters, in a scene without links.
-    pub(crate) fn emitter_tree(&self) -> Option<&EmitterTree> {
+    pub(crate) fn emitter_tree(&self) -> Option<&LightTree> {
         self.emitter_tree.as_ref()
     }
 
@@ -192,9 +192,29 @@ impl<'a> Gather<'a> {
     /// A gather for the points in the closure of one element.
     pub fn over(&'a self, element: NodeId) -> LeafGather<'a> {
         match self.emitter_tree {
-            Some(_) => self.over_shafts(element, &mut Shafts::default()),
+            Some(_) => {
+                let emitters = self.over_shafts(element, &mut Shafts::default());
+                LeafGather { prominent: self.over_reflectors(element).prominent, ..emitters }
+            }
             None => self.over_sources(element, |_| true),
         }
+    }
+
+    /// The same for light over reflectors alone.
+    pub fn over_reflectors(&'a self, element: NodeId) -> LeafGather<'a> {
+        match self.emitter_tree {
+            Some(_) => self.over_prominent(element, Vec::new()),
+            None => self.over_sources(element, |_| true),
+        }
+    }
+
+    /// A gather over sources, and over the reflectors that are prominent at the element.
+    pub(crate) fn over_prominent(&'a self, element: NodeId, sources: Vec<Source>) -> LeafGather<'a> {
+        let polygon = self.solution.elements.polygon_of(element).unwrap_or_default();
+        let plane = self.geometry.plane(polygon);
+        let prominent = self.rays().map_or_else(Vec::new, |rays| rays.prominent(self.solution, element, &plane));
+        let centre = self.solution.elements.nodes[element as usize].centre;
+        LeafGather { gather: self, polygon, centre, sources, groups: Vec::new(), prominent, blockers: Vec::new() }
     }
 
     /// How much light, luminance, W·m⁻², the plane over a reflector's node misplaces at a point with the given form factor to
@@ -282,7 +302,7 @@ impl<'a> Gather<'a> {
         blockers.dedup();
         let polygon = elements.polygon_of(element).unwrap_or_default();
         let centre = elements.nodes[element as usize].centre;
-        LeafGather { gather: self, polygon, centre, sources, groups: Vec::new(), blockers }
+        LeafGather { gather: self, polygon, centre, sources, groups: Vec::new(), prominent: Vec::new(), blockers }
     }
 
     /// A source polygon by all links from it.
@@ -314,14 +334,6 @@ impl<'a> Gather<'a> {
         match self.leaf_under(polygon, position, DVec3::ZERO, inward) {
             Some(leaf) => self.over(leaf).irradiance(position, inward),
             None => Rgb::ZERO,
-        }
-    }
-
-    /// Appends the nodes of reflectors that rays find from a position of a polygon; nothing in a scene with links. `inward` as
-    /// for [`LeafGather::irradiance`].
-    pub fn seen_by_rays(&self, polygon: u32, position: DVec3, inward: DVec3, seen: &mut Vec<SeenNode>) {
-        if let Some(rays) = self.rays() {
-            rays.seen_nodes(self.solution, polygon, position, inward, seen);
         }
     }
 

@@ -49,6 +49,8 @@ pub struct LeafGather<'a> {
     pub(crate) sources: Vec<Source>,
     /// Groups of emitters that are faint here, in a scene without links.
     pub(crate) groups: Vec<u32>,
+    /// Patches of reflectors that are looked at one by one, by their roots, in a scene without links.
+    pub(crate) prominent: Vec<NodeId>,
     /// All blockers of all sources, ascending.
     pub(crate) blockers: Vec<u32>,
 }
@@ -141,7 +143,9 @@ impl LeafGather<'_> {
             None => {
                 self.look(position, inward, Light::Reflected, seen);
             }
-            Some(rays) => rays.seen_nodes(self.gather.solution, self.polygon, position, inward, seen),
+            Some(rays) => {
+                rays.seen_nodes(self.gather.solution, &self.prominent, self.polygon, position, inward, seen);
+            }
         }
     }
 

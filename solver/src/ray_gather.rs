@@ -1,6 +1,6 @@
 //! What a point sees of the reflectors, by rays: for scenes of too many polygons to look at each.
 //!
-//! Two kinds of rays share what there is to see. Patches that send most of a scene's light are looked at one by one: the form
+//! Two kinds of rays share what there is to see. Patches that send much to a point are looked at one by one: the form
 //! factor is exact, and rays to points spread over them tell how much of it is hidden, none of it in most cases. All else is
 //! met by rays spread evenly over the hemisphere, by the cosine. A ray that meets what is looked at one by one counts nothing:
 //! what is divided is the surfaces, so that nothing counts twice and nothing is lost. Nothing leaks: a ray stops where it
@@ -9,10 +9,11 @@
 use std::f64::consts::TAU;
 
 use glam::{DVec2, DVec3};
-use scene::{Bvh, Ray, Scene, luminance, other_sides};
+use scene::{Bvh, Plane, Ray, Scene, luminance, other_sides};
 
 use crate::form_factor::form_factor_at;
 use crate::leaf_gather::SeenNode;
+use crate::light_tree::{Light, LightTree};
 use crate::{NodeId, Patch, Solution};
 
 /// The powers of the plastic number, whose multiples fill the square evenly (Roberts 2018).
@@ -40,20 +41,12 @@ const FEW_RAYS: f64 = 0.25;
 /// the rounding of rays, below anything that light tells apart.
 pub(crate) const ASIDE: f64 = 1e-7;
 
-/// Patches that are looked at one by one, at most, and the part of all reflected light that they send at most: more cost every
-/// point, fewer leave bright ones to chance.
-const MOST_PROMINENT: usize = 96;
-const PROMINENT_SHARE: f64 = 0.9;
-
-/// The place of a patch that is not among them.
-const NOT_PROMINENT: u16 = u16::MAX;
-
 /// A patch is looked at where it sends more than this part of the budget to a point.
 const NEGLIGIBLE: f64 = 2.0;
 
 /// Rays that tell what is hidden of a node, at least: of a dim one and of a bright one. A large node gets as many as would meet
 /// it of those over the hemisphere. To stop early where the first agree would take what is mostly seen for seen wholly.
-const AIMED_RAYS: [u32; 2] = [2, 4];
+const AIMED_RAYS: [u32; 2] = [1, 2];
 
 /// Where rays start: a position just in front of all that touches it, on a polygon.
 struct Origin {
@@ -67,9 +60,9 @@ struct Origin {
 /// Sends rays into a solved scene.
 pub(crate) struct RayGather {
     bvh: Bvh,
-    /// Root nodes that are looked at one by one, and by patch the place among them.
-    prominent: Vec<NodeId>,
-    place_of: Vec<u16>,
+    /// Root nodes of all patches that reflect light, and the hierarchy over them.
+    roots: Vec<NodeId>,
+    tree: LightTree,
     /// By triangle of the hierarchy, the patch that it is a part of.
     patches: Vec<u32>,
     other_sides: Vec<Option<u32>>,
@@ -101,14 +94,17 @@ impl RayGather {
         let small = (SMALL_POLYGON * scene.size()).powi(2);
         let is_small = |polygon: u32| scene.area(polygon) < small;
         let few = ((f64::from(rays) * FEW_RAYS) as u32).max(1);
-        let prominent = prominent(scene, solution);
-        let mut place_of = vec![NOT_PROMINENT; elements.patches.len()];
-        for (place, &root) in (0..).zip(&prominent) {
-            place_of[elements.patch_of(root).unwrap_or_default() as usize] = place;
-        }
+        let light = |patch: &Patch| {
+            let root = patch.root;
+            let radiosity = luminance(scene.reflectance(patch.polygon) * solution.light[root as usize].irradiance);
+            let power = radiosity * elements.nodes[root as usize].area;
+            let axis = scene.plane(patch.polygon).normal;
+            (power > 0.0).then(|| (root, Light::of_outline(elements.outline(root), axis, root, power)))
+        };
+        let (roots, lights): (Vec<NodeId>, Vec<Light>) = elements.patches.iter().filter_map(light).unzip();
         Self {
-            prominent,
-            place_of,
+            roots,
+            tree: LightTree::new(&lights),
             bvh: Bvh::of_triangles(triangles),
             patches,
             other_sides: other_sides(scene),
@@ -122,11 +118,19 @@ impl RayGather {
         }
     }
 
+    /// Root nodes of the patches that may send more than next to nothing to a point of an element.
+    pub fn prominent(&self, solution: &Solution, element: NodeId, plane: &Plane) -> Vec<NodeId> {
+        let cut = self.tree.cut(solution.elements.outline(element), plane, NEGLIGIBLE * self.budget);
+        cut.single.iter().map(|&number| self.roots[number as usize]).collect()
+    }
+
     /// Appends the nodes of reflectors that a position of a polygon sees; ascending, each once. `inward` is the
-    /// direction in the plane that a position is approached from where other polygons touch it; zero elsewhere.
+    /// direction in the plane that a position is approached from where other polygons touch it; zero elsewhere. `prominent` are
+    /// patches that are to be looked at one by one.
     pub fn seen_nodes(
         &self,
         solution: &Solution,
+        prominent: &[NodeId],
         polygon: u32,
         position: DVec3,
         inward: DVec3,
@@ -139,10 +143,8 @@ impl RayGather {
             shift: shift(position, self.turn),
         };
         let first = seen.len();
-        let mut looked_at = vec![false; self.prominent.len()];
-        for (&root, looked_at) in self.prominent.iter().zip(&mut looked_at) {
-            *looked_at = self.look_at(solution, root, &from, seen);
-        }
+        let looked_at: Vec<NodeId> =
+            prominent.iter().copied().filter(|&root| self.look_at(solution, root, &from, seen)).collect();
         self.look_around(solution, &from, &looked_at, seen);
         merge(seen, first);
     }
@@ -220,7 +222,7 @@ impl RayGather {
     }
 
     /// Adds what rays over the hemisphere meet of patches that are not looked at.
-    fn look_around(&self, solution: &Solution, from: &Origin, looked_at: &[bool], seen: &mut Vec<SeenNode>) {
+    fn look_around(&self, solution: &Solution, from: &Origin, looked_at: &[NodeId], seen: &mut Vec<SeenNode>) {
         let elements = &solution.elements;
         let rays = self.rays[from.polygon as usize];
         let share = 1.0 / f64::from(rays);
@@ -235,11 +237,10 @@ impl RayGather {
             if hit.normal.dot(direction) >= 0.0 {
                 continue; // A back, which is black.
             }
-            let patch = self.patches[hit.id as usize];
-            if looked_at.get(self.place_of[patch as usize] as usize) == Some(&true) {
+            let frame = &elements.patches[self.patches[hit.id as usize] as usize];
+            if looked_at.binary_search(&frame.root).is_ok() {
                 continue;
             }
-            let frame = &elements.patches[patch as usize];
             let place = from.position + direction * hit.distance;
             let node = self.standing_for(solution, frame, place);
             let offset = frame.along(place - elements.nodes[node as usize].centre);
@@ -285,24 +286,6 @@ impl RayGather {
 /// Rays from a point for a source error.
 pub(crate) fn rays_for(source_error: f64) -> u32 {
     (RAYS * (RAYS_ERROR / source_error).powf(4.0 / 3.0)).clamp(LEAST_RAYS, MOST_RAYS) as u32
-}
-
-/// The patches that reflect most.
-fn prominent(scene: &Scene, solution: &Solution) -> Vec<NodeId> {
-    let elements = &solution.elements;
-    let power = |patch: &Patch| {
-        let reflected = scene.reflectance(patch.polygon) * solution.light[patch.root as usize].irradiance;
-        luminance(reflected) * elements.nodes[patch.root as usize].area
-    };
-    let mut patches: Vec<(f64, NodeId)> = elements.patches.iter().map(|patch| (power(patch), patch.root)).collect();
-    patches.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
-    let mut left = PROMINENT_SHARE * patches.iter().map(|patch| patch.0).sum::<f64>();
-    let needed = patches.iter().take(MOST_PROMINENT).take_while(|patch| {
-        let wanted = left > 0.0;
-        left -= patch.0;
-        wanted
-    });
-    needed.map(|patch| patch.1).collect()
 }
 
 /// Makes one of all that is seen of each node from `first` on.
@@ -394,11 +377,14 @@ mod tests {
             .build();
         let solution = solve(&room, &SolveOptions { link_error: Some(0.1), bounces: None }, &|_| ());
         let gather = RayGather::new(&room, &solution, 256, 1e-3, 0);
+        let floor = solution.patch_roots(4).next().expect("the floor is a patch");
+        let prominent = gather.prominent(&solution, floor, &room.plane(4));
+        assert!(prominent.len() > 5);
         let mut sums = Vec::new();
         for i in 0..40 {
             let position = DVec3::new(0.1 + 0.094 * f64::from(i), 0.2 + f64::from(i * 7 % 40) * 0.065, 0.0);
             let mut seen = Vec::new();
-            gather.seen_nodes(&solution, 4, position, DVec3::ZERO, &mut seen);
+            gather.seen_nodes(&solution, &prominent, 4, position, DVec3::ZERO, &mut seen);
             let sum: f64 = seen.iter().map(|seen| seen.form_factor).sum();
             sums.push(sum - 1.0);
         }

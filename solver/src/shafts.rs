@@ -90,7 +90,7 @@ impl<'a> Gather<'a> {
             sources.iter().filter_map(|source| source.blockers.as_ref()).flatten().copied().collect();
         blockers.sort_unstable();
         blockers.dedup();
-        LeafGather { gather: self, polygon, centre, sources, groups: cut.groups, blockers }
+        LeafGather { gather: self, polygon, centre, sources, groups: cut.groups, prominent: Vec::new(), blockers }
     }
 
     /// What stands in the shaft between an emitter and an element.
