@@ -10,6 +10,8 @@ use rayon::prelude::*;
 use scene::{DiscontinuityLine, Rgb, Scene};
 use solver::{Gather, NodeId, Solution};
 
+use crate::guess::guessed_emitted;
+use crate::inquiry::Inquiry;
 use crate::probe::{colour_mean, probe_point};
 use crate::samples::QueryKey;
 use crate::small_patch::middle_of_small;
@@ -35,9 +37,9 @@ pub(crate) struct FineMesh {
     probed: Vec<Rgb>,
 }
 
-/// Irradiance from emitters at every point that was asked for so far, W·m⁻²: from mesh to mesh most stay.
+/// Which answer is the irradiance from emitters, at every point that was asked for so far: from mesh to mesh most stay.
 #[derive(Default)]
-pub(crate) struct EmittedLight(HashMap<QueryKey, Rgb>);
+pub(crate) struct EmittedLight(HashMap<QueryKey, u32>);
 
 impl FineMesh {
     /// Meshes the solution's leaves with the `count` strongest discontinuities of each. An emitter that sends less than `dim` of
@@ -49,6 +51,7 @@ impl FineMesh {
         (weight, count): (Weight, usize),
         dim: f64,
         known: &mut EmittedLight,
+        inquiry: &mut Inquiry<'_>,
     ) -> Self {
         let (leaves, lines) = divided_leaves(scene, solution, found, weight, count);
         let mesh = leaf_meshes(&edge_table(scene, &solution.cuts, &leaves));
@@ -59,9 +62,9 @@ impl FineMesh {
         let small = SMALL_PATCH * scene.size();
         let stands_in = |query: &SampleQuery| middle_of_small(solution, query, small).unwrap_or(*query);
         let queries: Vec<SampleQuery> = fine.table.queries.iter().map(stands_in).collect();
-        known.find(&gather, queries.iter().chain(&probes));
-        fine.emitted = known.at(&queries);
-        fine.probed = known.at(&probes);
+        known.find(&gather, queries.iter().chain(&probes), inquiry);
+        fine.emitted = known.at(solution, &queries, inquiry);
+        fine.probed = known.at(solution, &probes, inquiry);
         fine
     }
 
@@ -99,23 +102,28 @@ impl FineMesh {
 
 impl EmittedLight {
     /// Evaluates what is not known yet, each leaf's points together.
-    fn find<'a>(&mut self, gather: &Gather<'_>, queries: impl Iterator<Item = &'a SampleQuery>) {
+    fn find<'a>(
+        &mut self,
+        gather: &Gather<'_>,
+        queries: impl Iterator<Item = &'a SampleQuery>,
+        inquiry: &mut Inquiry<'_>,
+    ) {
         let mut unknown: Vec<&SampleQuery> = queries.filter(|query| !self.0.contains_key(&query.key())).collect();
         unknown.sort_by_key(|query| query.element);
         unknown.dedup_by_key(|query| query.key());
-        let groups: Vec<&[&SampleQuery]> = unknown.chunk_by(|a, b| a.element == b.element).collect();
-        let found: Vec<Vec<Rgb>> = groups
-            .par_iter()
-            .map(|group| {
-                let leaf = gather.over_emitters(group[0].element);
-                group.iter().map(|query| leaf.emitted(query.position, query.inward)).collect()
-            })
-            .collect();
-        self.0.extend(unknown.iter().map(|query| query.key()).zip(found.into_iter().flatten()));
+        let found = inquiry.emitted(&unknown, |group| {
+            let leaf = gather.over_emitters(group[0].element);
+            group.iter().map(|query| leaf.emitted(query.position, query.inward)).collect()
+        });
+        self.0.extend(unknown.iter().map(|query| query.key()).zip(found));
     }
 
-    fn at(&self, queries: &[SampleQuery]) -> Vec<Rgb> {
-        queries.par_iter().map(|query| self.0[&query.key()]).collect()
+    fn at(&self, solution: &Solution, queries: &[SampleQuery], inquiry: &Inquiry<'_>) -> Vec<Rgb> {
+        let known = |query: &SampleQuery| self.0.get(&query.key()).map(|&number| inquiry.light(number));
+        if inquiry.stopped() {
+            return guessed_emitted(solution, queries, &queries.iter().map(known).collect::<Vec<_>>());
+        }
+        queries.par_iter().map(|query| known(query).unwrap_or_default()).collect()
     }
 }
 
