@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use anyhow::{Result, bail};
+use bytesize::ByteSize;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use glam::DVec3;
@@ -69,6 +70,9 @@ pub struct BakeFlags {
     /// What the bake may take
     #[command(flatten)]
     pub limits: LimitFlags,
+    /// Go on with the interrupted bake at the output path; what comes of it is the same as without the interruption
+    #[arg(long)]
+    pub resume: bool,
     /// Print one JSON object on stdout: counts, seconds by stage, memory and measured error
     #[arg(long)]
     pub json: bool,
@@ -117,6 +121,10 @@ pub struct LimitFlags {
     /// Seconds after which no further round of refinement begins
     #[arg(long, value_name = "S", value_parser = positive, allow_hyphen_values = true)]
     pub max_seconds: Option<f64>,
+    /// Memory that the bake may hold, such as 2GB or 500MB; a scene that needs more at least is refused [default: a scene is refused
+    /// that needs more at least than the machine has to give]
+    #[arg(long, value_name = "SIZE", value_parser = size_in_bytes)]
+    pub max_memory: Option<u64>,
 }
 
 /// The error that is accepted where none is named: what no eye sees.
@@ -393,6 +401,13 @@ fn tolerance(text: &str) -> Result<f64, String> {
         Ok(value)
     } else {
         Err(format!("must lie between {low} and {high}, such as 0.01"))
+    }
+}
+
+fn size_in_bytes(text: &str) -> Result<u64, String> {
+    match text.parse::<ByteSize>() {
+        Ok(ByteSize(bytes)) if bytes > 0 => Ok(bytes),
+        _ => Err("must be a size of more than nothing, such as 2GB or 500MB".into()),
     }
 }
 

@@ -11,6 +11,8 @@ pub enum Outcome {
     Done,
     /// Everything was done, and a comparison or verification did not hold.
     Differs,
+    /// The work was interrupted, and what was done of it is kept.
+    Interrupted,
 }
 
 /// The flags are wrong, which showed only after all of them, or the scene, had been read.
@@ -19,7 +21,7 @@ pub enum Outcome {
 pub struct Usage(pub String);
 
 /// The exit code of an interrupted run, as shells count it: 128 + SIGINT.
-pub const INTERRUPTED: i32 = 130;
+pub const INTERRUPTED: u8 = 130;
 
 /// The exit code that a run ends with.
 pub fn exit_code(result: &anyhow::Result<Outcome>) -> ExitCode {
@@ -28,6 +30,7 @@ pub fn exit_code(result: &anyhow::Result<Outcome>) -> ExitCode {
         Err(error) if error.is::<Usage>() => 2,
         Err(_) => 1,
         Ok(Outcome::Differs) => 3,
+        Ok(Outcome::Interrupted) => INTERRUPTED,
     })
 }
 
@@ -54,6 +57,7 @@ mod tests {
         assert_eq!(code(Err(anyhow!("no room"))), expected(1));
         assert_eq!(code(Err(Usage("--eye".into()).into())), expected(2));
         assert_eq!(code(Ok(Outcome::Differs)), expected(3));
+        assert_eq!(code(Ok(Outcome::Interrupted)), expected(130));
     }
 
     #[test]

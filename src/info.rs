@@ -17,8 +17,9 @@ use crate::report::{peak_memory, print_json};
 pub fn run(flags: &InfoFlags) -> Result<Outcome> {
     let info = if formats::is_baked(&flags.input) {
         no_bake(&flags.input, flags.reading)?;
-        let baked = formats::read_baked(&flags.input)?;
-        Info { scene: SceneInfo::of(&baked.scene), import: None, bake: Some(BakeInfo::of(&baked)) }
+        let (baked, unfinished) = formats::read_unfinished(&flags.input)?;
+        let bake = BakeInfo::of(&baked, unfinished.is_some());
+        Info { scene: SceneInfo::of(&baked.scene), import: None, bake: Some(bake) }
     } else {
         let (Imported { scene, report }, seconds) = read_scene(&flags.input, flags.reading)?;
         let import = ImportInfo { report, seconds, peak_memory_bytes: peak_memory() };
@@ -89,6 +90,7 @@ struct BakeInfo {
     /// Area-weighted mean irradiance, W·m⁻².
     mean_irradiance: [f64; 3],
     error: ErrorReport,
+    interrupted: bool,
 }
 
 impl SceneInfo {
@@ -121,8 +123,9 @@ impl TextureInfo {
 }
 
 impl BakeInfo {
-    fn of(baked: &Baked) -> Self {
+    fn of(baked: &Baked, interrupted: bool) -> Self {
         Self {
+            interrupted,
             program: baked.provenance.program.clone(),
             options: baked.provenance.options.clone(),
             statistics: baked.provenance.statistics.clone(),
@@ -173,20 +176,19 @@ impl Info {
             text += &format!(
                 "bake             {} triangles, {} samples, {} elements, {} discontinuities\n\
                  mean irradiance  {} W/m²\n\
-                 measured error   {:.3} % rms, {:.3} % at 99 %, {:.3} % at most, over {} points: the tolerance is {}\n\
+                 measured error   {}\n\
                  made by          {}\n",
                 bake.triangles,
                 bake.samples,
                 bake.elements,
                 bake.discontinuities,
                 triple(&bake.mean_irradiance),
-                100.0 * bake.error.rms,
-                100.0 * bake.error.p99,
-                100.0 * bake.error.max,
-                bake.error.points,
-                if bake.error.holds { "kept" } else { "not kept" },
+                bake.error.text(),
                 bake.program
             );
+            if bake.interrupted {
+                text += "  was interrupted; the command that began it goes on with --resume\n";
+            }
             for (name, value) in &bake.options {
                 text += &format!("  {name:<20} {value}\n");
             }

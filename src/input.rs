@@ -8,7 +8,7 @@ use etcetera::BaseStrategy;
 use formats::{Imported, Sides};
 use scene::{Baked, Scene};
 
-use crate::args::{LightFlags, LimitFlags, SceneFlags};
+use crate::args::{LightFlags, SceneFlags};
 use crate::bake::missed;
 use crate::failure::Usage;
 use crate::output::Outputs;
@@ -102,7 +102,7 @@ fn bake_once(scene: &Scene, flags: &LightFlags, outputs: &Outputs) -> Baked {
 }
 
 fn baked_anew(scene: &Scene, flags: &LightFlags) -> Baked {
-    let baked = pipeline::bake(scene, flags, &LimitFlags::default()).baked;
+    let baked = pipeline::bake(scene, flags).baked;
     if !baked.error.holds {
         say(format_args!("warning: {}", missed(&baked, flags.tolerance)));
     }

@@ -10,11 +10,14 @@ mod failure;
 mod ground_truth;
 mod info;
 mod input;
+mod interrupt;
+mod memory;
 mod output;
 mod pipeline;
 mod probe;
 mod progress;
 mod report;
+mod resume;
 mod shot;
 mod validate;
 mod verification;
@@ -28,6 +31,7 @@ use clap::Parser;
 
 use args::{Command, Flags};
 use failure::Outcome;
+use interrupt::Interrupt;
 use output::Outputs;
 use progress::say;
 
@@ -53,14 +57,19 @@ fn main() -> ExitCode {
 
 fn run(command: Command) -> Result<Outcome> {
     let outputs = Outputs::default();
-    let held = outputs.clone();
+    let interrupt = Interrupt::default();
+    let (held, pressed) = (outputs.clone(), interrupt.clone());
     ctrlc::set_handler(move || {
+        if pressed.press() {
+            return;
+        }
         let _held = held.hold();
-        std::process::exit(failure::INTERRUPTED);
+        say("interrupted; what was not finished is not kept");
+        std::process::exit(i32::from(failure::INTERRUPTED));
     })
     .context("cannot listen for Ctrl-C")?;
     match command {
-        Command::Bake(flags) => bake::run(&flags, &outputs),
+        Command::Bake(flags) => bake::run(&flags, &outputs, &interrupt),
         Command::Shot(flags) => shot::run(&flags, &outputs),
         Command::View(flags) => view::run(&flags, &outputs),
         Command::Probe(flags) => probe::run(&flags, &outputs),

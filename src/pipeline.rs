@@ -3,11 +3,12 @@
 use std::time::Instant;
 
 use mesher::{BakeOptions, Control, Weight};
-use scene::{Baked, BakedError, Provenance, Scene};
+use scene::{Answers, Baked, BakedError, Provenance, Scene};
 use serde::Serialize;
 use solver::{Solution, SolveOptions};
 
 use crate::args::{LightFlags, LimitFlags, WeightChoice};
+use crate::interrupt::Interrupt;
 use crate::progress::Stage;
 
 /// The program as a bake's provenance names it.
@@ -29,10 +30,18 @@ pub struct Bake {
     pub solution: Solution,
     /// Counts and seconds.
     pub report: BakeReport,
+    /// If the bake was interrupted, what it has found out so far.
+    pub answers: Option<Answers>,
 }
 
-/// Bakes a scene within limits. What is limited is looked at between rounds.
-pub fn bake(scene: &Scene, flags: &LightFlags, limits: &LimitFlags) -> Bake {
+/// Bakes a scene.
+pub fn bake(scene: &Scene, flags: &LightFlags) -> Bake {
+    resume(scene, flags, &LimitFlags::default(), Answers::default(), &Interrupt::default())
+}
+
+/// Bakes a scene within limits, with what an interrupted bake of it has found out. Seconds are looked at between rounds, and once
+/// the scene is solved, Ctrl-C at any time.
+pub fn resume(scene: &Scene, flags: &LightFlags, limits: &LimitFlags, answers: Answers, interrupt: &Interrupt) -> Bake {
     let start = Instant::now();
     let (solution, solve_seconds) = solve(scene, flags);
     let links = solution.links.len();
@@ -47,10 +56,13 @@ pub fn bake(scene: &Scene, flags: &LightFlags, limits: &LimitFlags) -> Bake {
         },
         min_weight: flags.min_weight,
         max_triangles: limits.max_triangles.map_or(defaults.max_triangles, |most| most as usize),
+        max_bytes: limits.max_memory.map_or(defaults.max_bytes, |most| usize::try_from(most).unwrap_or(usize::MAX)),
     };
     let late = || limits.max_seconds.is_some_and(|seconds| start.elapsed().as_secs_f64() >= seconds);
-    let control = Control { progress: &|fraction| stage.advance(fraction), stop: &late };
-    let mesher::Bake { mut baked, solution, statistics } = mesher::bake(scene, solution, &options, control);
+    let control =
+        Control { progress: &|fraction| stage.advance(fraction), stop: &late, interrupted: &|| interrupt.pressed() };
+    let mesher::Bake { mut baked, solution, statistics, answers } =
+        interrupt.heeded_by(|| mesher::resume(scene, solution, &options, control, answers));
     let mesh_seconds = stage.end();
     let report = BakeReport {
         polygons: scene.polygons.len(),
@@ -71,10 +83,11 @@ pub fn bake(scene: &Scene, flags: &LightFlags, limits: &LimitFlags) -> Bake {
         rounds: statistics.rounds,
         error: baked.error.into(),
         seconds: Seconds { solve: solve_seconds, mesh: mesh_seconds, ..Seconds::default() },
+        counted_memory_bytes: statistics.bytes,
         peak_memory_bytes: None,
     };
     baked.provenance = provenance(&solution, &options, &report, statistics.min_weight);
-    Bake { baked, solution, report }
+    Bake { baked, solution, report, answers }
 }
 
 /// What made a bake: the options as they were used, and the counts. No seconds: the same input gives the same bytes.
@@ -165,6 +178,8 @@ pub struct BakeReport {
     pub error: ErrorReport,
     /// Seconds by stage.
     pub seconds: Seconds,
+    /// Bytes held by the tables of a bake at most, as `--max-memory` counts them.
+    pub counted_memory_bytes: usize,
     /// Largest part of memory held, bytes; null where the system does not tell.
     pub peak_memory_bytes: Option<u64>,
 }
@@ -182,6 +197,23 @@ pub struct ErrorReport {
     pub points: u64,
     /// Whether the tolerance is kept.
     pub holds: bool,
+}
+
+impl ErrorReport {
+    /// The errors in words.
+    pub fn text(&self) -> String {
+        if self.points == 0 && !self.holds {
+            return "none: the bake was stopped before".to_owned();
+        }
+        format!(
+            "{:.3} % rms, {:.3} % at 99 %, {:.3} % at most, over {} points: the tolerance is {}",
+            100.0 * self.rms,
+            100.0 * self.p99,
+            100.0 * self.max,
+            self.points,
+            if self.holds { "kept" } else { "not kept" }
+        )
+    }
 }
 
 impl From<BakedError> for ErrorReport {

@@ -18,6 +18,7 @@ mod golden;
 mod known_issues;
 mod leaks;
 mod licences;
+mod long_bakes;
 mod many_polygons;
 mod parity;
 mod readme;

@@ -10,16 +10,18 @@
 //! | then | the sections, one after another without gaps |
 //!
 //! Everything is little-endian. A section is an array of fixed-size rows: positions in metres, irradiance in W·m⁻²,
-//! indices u32. Nothing in the file depends on when, where or on how many threads it was made.
+//! indices u32. Nothing in the file depends on when, where or on how many threads it was made, unless the bake was
+//! interrupted: then more sections follow (`unfinished`).
 
 use std::fs;
 use std::io::Read;
 use std::path::Path;
 
-use scene::{Baked, BakedError, Material, NamedCamera, Provenance, Scene, Texture};
+use scene::{Baked, BakedError, Material, NamedCamera, Provenance, Scene, Texture, Unfinished};
 use serde::{Deserialize, Serialize};
 
 use crate::record::{Record, from_bytes, to_bytes};
+use crate::unfinished::{self, UNFINISHED};
 use crate::{FormatError, write_atomically};
 
 const MAGIC: [u8; 8] = *b"\x89HLF\r\n\x1a\n";
@@ -69,9 +71,21 @@ pub fn is_baked(path: &Path) -> bool {
 /// # Errors
 /// A bake that does not pass [`Baked::validate`], or a path that cannot be written; then nothing is left behind.
 pub fn write_baked(path: &Path, baked: &Baked) -> Result<(), FormatError> {
+    write(path, baked, None)
+}
+
+/// Writes an interrupted bake with what it has found out.
+///
+/// # Errors
+/// Those of [`write_baked`].
+pub fn write_unfinished(path: &Path, baked: &Baked, unfinished: &Unfinished) -> Result<(), FormatError> {
+    write(path, baked, Some(unfinished))
+}
+
+fn write(path: &Path, baked: &Baked, unfinished: Option<&Unfinished>) -> Result<(), FormatError> {
     baked.validate().map_err(|source| FormatError::Invalid { path: path.to_owned(), source })?;
     let scene = &baked.scene;
-    let arrays = [
+    let mut arrays = vec![
         ("scene vertices", to_bytes(&scene.vertices)),
         ("scene corners", to_bytes(&scene.corners)),
         ("texture coordinates", to_bytes(&scene.texture_coordinates)),
@@ -86,6 +100,7 @@ pub fn write_baked(path: &Path, baked: &Baked) -> Result<(), FormatError> {
         ("elements", to_bytes(&baked.elements)),
         ("lines", to_bytes(&baked.lines)),
     ];
+    arrays.extend(unfinished.into_iter().flat_map(unfinished::sections));
     let mut offset = 0;
     let sections = arrays.iter().map(|(name, bytes)| {
         let length = bytes.len() as u64;
@@ -123,6 +138,14 @@ pub fn write_baked(path: &Path, baked: &Baked) -> Result<(), FormatError> {
 /// Distinct ones for a file that is none, is cut off, was altered, comes from a later version, or holds a bake that
 /// does not pass [`Baked::validate`].
 pub fn read_baked(path: &Path) -> Result<Baked, FormatError> {
+    Ok(read_unfinished(path)?.0)
+}
+
+/// Reads a bake as [`read_baked`] does, and if it was interrupted, what it had found out.
+///
+/// # Errors
+/// Those of [`read_baked`], of what it had found out, too.
+pub fn read_unfinished(path: &Path) -> Result<(Baked, Option<Unfinished>), FormatError> {
     let bytes = fs::read(path).map_err(|error| FormatError::read(path, error))?;
     let truncated = |part: &str| FormatError::Truncated {
         path: path.to_owned(),
@@ -195,8 +218,15 @@ pub fn read_baked(path: &Path) -> Result<Baked, FormatError> {
         error: header.error,
         provenance: header.provenance,
     };
-    baked.validate().map_err(|source| FormatError::Invalid { path: path.to_owned(), source })?;
-    Ok(baked)
+    let invalid = |source| FormatError::Invalid { path: path.to_owned(), source };
+    baked.validate().map_err(invalid)?;
+    if sections.bytes(UNFINISHED).is_none() {
+        return Ok((baked, None));
+    }
+    let unfinished = unfinished::unfinished(|name| sections.bytes(name))
+        .map_err(|part| altered(part, "it is missing or has no meaning"))?;
+    unfinished.answers.validate().map_err(invalid)?;
+    Ok((baked, Some(unfinished)))
 }
 
 /// Textures of the given names and sizes, which take all of the texels; none where they do not.
@@ -218,9 +248,12 @@ struct Sections<'a, F> {
 
 impl<F: Fn(&str, &'static str) -> FormatError> Sections<'_, F> {
     fn rows<T: Record>(&self, name: &str) -> Result<Vec<T>, FormatError> {
-        let section = self.table.iter().find(|section| section.name == name);
-        let section = section.ok_or_else(|| (self.altered)(name, "the section is missing"))?;
-        from_bytes(slice(self.body, section)).ok_or_else(|| (self.altered)(name, "a row has no meaning"))
+        let bytes = self.bytes(name).ok_or_else(|| (self.altered)(name, "the section is missing"))?;
+        from_bytes(bytes).ok_or_else(|| (self.altered)(name, "a row has no meaning"))
+    }
+
+    fn bytes(&self, name: &str) -> Option<&[u8]> {
+        self.table.iter().find(|section| section.name == name).map(|section| slice(self.body, section))
     }
 }
 
@@ -252,7 +285,9 @@ mod tests {
 
     use glam::{DVec3, Vec2, Vec3};
     use proptest::prelude::*;
-    use scene::{BakedElement, BakedTriangle, Camera, DiscontinuityLine, EdgeKind, LineKind, Polygon};
+    use scene::{
+        Answers, BakedElement, BakedTriangle, Camera, DiscontinuityLine, EdgeKind, LineKind, Polygon, Rgb, Seen,
+    };
 
     use super::*;
 
@@ -309,6 +344,31 @@ mod tests {
         }
     }
 
+    /// What an interrupted bake has found out, with an answer of every kind.
+    fn found_out() -> Unfinished {
+        let seen = |node| Seen { node, form_factor: 0.25, offset: [1.0, -2.0] };
+        Unfinished {
+            build: "halflight 0.1.0".into(),
+            options: "tolerance 0.01".into(),
+            answers: Answers {
+                questions: vec![1, u64::MAX, 3],
+                emitted: vec![Rgb::new(1.0, 0.5, 1.0 / 3.0), Rgb::ZERO],
+                rows: vec![[seen(1), seen(7)].into(), [].into(), [seen(3)].into()],
+                residuals: vec![[0.1, 0.2, 0.3, -0.1, -0.2, -0.3, 7.0]],
+            },
+        }
+    }
+
+    fn interrupted(unfinished: &Unfinished) -> Vec<u8> {
+        let file = File::new(&[]);
+        write_unfinished(&file.path, &bake(), unfinished).unwrap();
+        fs::read(&file.path).unwrap()
+    }
+
+    fn read_interrupted(bytes: &[u8]) -> Result<(Baked, Option<Unfinished>), FormatError> {
+        read_unfinished(&File::new(bytes).path)
+    }
+
     fn written(baked: &Baked) -> Vec<u8> {
         let file = File::new(&[]);
         write_baked(&file.path, baked).unwrap();
@@ -341,6 +401,23 @@ mod tests {
             assert_eq!(read(&bytes).unwrap(), baked);
             assert_eq!(written(&baked), bytes);
         }
+    }
+
+    #[test]
+    fn an_interrupted_bake_comes_back_with_what_it_found_out_and_is_a_bake_to_all_others() {
+        for unfinished in [Unfinished::default(), found_out()] {
+            let bytes = interrupted(&unfinished);
+            assert_eq!(read_interrupted(&bytes).unwrap(), (bake(), Some(unfinished)));
+            assert_eq!(read(&bytes).unwrap(), bake());
+        }
+        let good = written(&bake());
+        assert_eq!(read_interrupted(&good).unwrap(), (bake(), None));
+        let mut bad = found_out();
+        bad.answers.residuals[0][6] = f64::NAN;
+        assert!(matches!(read_interrupted(&interrupted(&bad)).unwrap_err(), FormatError::Invalid { .. }));
+        bad = found_out();
+        bad.answers.rows[0][1].form_factor = f32::INFINITY;
+        assert!(matches!(read_interrupted(&interrupted(&bad)).unwrap_err(), FormatError::Invalid { .. }));
     }
 
     #[test]
@@ -455,7 +532,7 @@ mod tests {
 
         #[test]
         fn any_flipped_bit_and_any_cut_is_noticed(place in any::<prop::sample::Index>(), bit in 0..8u32) {
-            let good = written(&bake());
+            let good = interrupted(&found_out());
             let at = place.index(good.len());
             prop_assert!(read(&good[..at]).is_err());
             let mut flipped = good;
@@ -466,9 +543,10 @@ mod tests {
         /// Past the checksums nothing but the checks of rows and [`Baked::validate`] stands.
         #[test]
         fn forged_sections_are_a_valid_bake_or_an_error(place in any::<prop::sample::Index>(), value: u8) {
-            let forged = forge(&written(&bake()), |body, _| body[place.index(body.len())] = value);
-            if let Ok(baked) = read(&forged) {
+            let forged = forge(&interrupted(&found_out()), |body, _| body[place.index(body.len())] = value);
+            if let Ok((baked, unfinished)) = read_interrupted(&forged) {
                 prop_assert!(baked.validate().is_ok());
+                prop_assert!(unfinished.is_none_or(|unfinished| unfinished.answers.validate().is_ok()));
             }
         }
     }

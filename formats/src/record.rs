@@ -1,7 +1,7 @@
 //! Records: the fixed-size, little-endian rows that the arrays of a `.hlf` file consist of.
 
 use glam::{DVec3, Vec2, Vec3};
-use scene::{BakedElement, BakedTriangle, DiscontinuityLine, EdgeKind, LineKind, Polygon};
+use scene::{BakedElement, BakedTriangle, DiscontinuityLine, EdgeKind, LineKind, Polygon, Seen};
 
 /// A value that takes the same number of bytes in every row.
 pub(crate) trait Record: Sized {
@@ -30,7 +30,7 @@ macro_rules! numbers {
         }
     )*};
 }
-numbers!(u8, u32, f32, f64);
+numbers!(u8, u32, u64, f32, f64);
 
 impl<T: Record + Copy + Default, const N: usize> Record for [T; N] {
     const SIZE: usize = N * T::SIZE;
@@ -177,6 +177,20 @@ impl Record for DiscontinuityLine {
         };
         let [receiver, source, blocker] = Record::take(bytes)?;
         Some(Self { kind, receiver, source, blocker, weight: Record::take(bytes)?, ends: Record::take(bytes)? })
+    }
+}
+
+impl Record for Seen {
+    const SIZE: usize = 16;
+
+    fn put(&self, bytes: &mut Vec<u8>) {
+        self.node.put(bytes);
+        self.form_factor.put(bytes);
+        self.offset.put(bytes);
+    }
+
+    fn take(bytes: &mut &[u8]) -> Option<Self> {
+        Some(Self { node: Record::take(bytes)?, form_factor: Record::take(bytes)?, offset: Record::take(bytes)? })
     }
 }
 

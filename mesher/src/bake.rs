@@ -5,11 +5,12 @@
 
 use glam::Vec3;
 use rayon::prelude::*;
-use scene::{Baked, BakedElement, BakedError, BakedTriangle, HalfEdges, Provenance, Rgb, Scene};
+use scene::{Answers, Baked, BakedElement, BakedError, BakedTriangle, HalfEdges, Provenance, Rgb, Scene};
 use solver::{Solution, Visibility};
 
 use crate::claimed_error::{P99, mean_reflectance, measured};
 use crate::fine_mesh::{EmittedLight, FineMesh};
+use crate::inquiry::Inquiry;
 use crate::probe::colour_mean;
 use crate::reflected_light::ReflectedLight;
 use crate::residual::residual;
@@ -31,6 +32,9 @@ pub struct BakeOptions {
     pub min_weight: Option<f64>,
     /// With more triangles than this a bake is not refined further; the last one with fewer is kept if there is one.
     pub max_triangles: usize,
+    /// Bytes that a bake may hold, by the lengths of its tables. Where the next answers would take more, it is stopped with the best
+    /// bake so far; a mesh is counted once it is there.
+    pub max_bytes: usize,
 }
 
 /// The share of the tolerance that the interpolation of emitters' light, and as much again that of reflectors' light, may use
@@ -63,6 +67,10 @@ const FIRST_SOURCE_SHARE: f64 = 0.12;
 const NEXT_SOURCE_SHARE: f64 = 0.3;
 const BIAS: f64 = 0.25;
 
+/// The error of a bake that was stopped before it was measured.
+const UNMEASURED: BakedError =
+    BakedError { rms: f64::INFINITY, p99: f64::INFINITY, max: f64::INFINITY, points: 0, holds: false };
+
 impl Default for BakeOptions {
     /// One percent, and the paper's k.
     fn default() -> Self {
@@ -72,6 +80,7 @@ impl Default for BakeOptions {
             weight: Weight::default(),
             min_weight: None,
             max_triangles: usize::MAX,
+            max_bytes: usize::MAX,
         }
     }
 }
@@ -83,6 +92,8 @@ pub struct Control<'a> {
     pub progress: Progress<'a>,
     /// Whether to stop with the best bake so far: asked between rounds.
     pub stop: &'a (dyn Fn() -> bool + Sync),
+    /// Whether to stop at once with the best that is known: asked all the time, from any thread.
+    pub interrupted: &'a (dyn Fn() -> bool + Sync),
 }
 
 /// A bake, the solution as it was refined for it, and counts.
@@ -94,6 +105,8 @@ pub struct Bake {
     pub solution: Solution,
     /// Counts.
     pub statistics: BakeStatistics,
+    /// If the bake was interrupted, what it has found out so far, for [`resume`].
+    pub answers: Option<Answers>,
 }
 
 /// Counts of a bake.
@@ -115,12 +128,28 @@ pub struct BakeStatistics {
     pub samples: usize,
     /// Points at which reflectors were looked at.
     pub rows: usize,
+    /// The most bytes that were held, by the lengths of tables.
+    pub bytes: usize,
     /// What the triangulation could not do as planned.
     pub mesh: MeshStatistics,
 }
 
 /// Bakes a solved scene.
+///
+/// A bake that was interrupted, or held too much, is the best one that was measured. If none was, it is the first mesh: with the light that is known, the best
+/// guess where none is (`guess`), and an error without a limit.
 pub fn bake(scene: &Scene, solution: Solution, options: &BakeOptions, control: Control<'_>) -> Bake {
+    resume(scene, solution, options, control, Answers::default())
+}
+
+/// Bakes a solved scene of which an interrupted bake has found out something. What comes of it is the same to the bit.
+pub fn resume(
+    scene: &Scene,
+    solution: Solution,
+    options: &BakeOptions,
+    control: Control<'_>,
+    answers: Answers,
+) -> Bake {
     let relative = options.tolerance / BakeOptions::default().tolerance;
     let min_weight = options.min_weight.unwrap_or_else(|| relative * options.weight.default_minimum(scene, &solution));
     (control.progress)(0.0);
@@ -132,6 +161,7 @@ pub fn bake(scene: &Scene, solution: Solution, options: &BakeOptions, control: C
     let mut rounds = Rounds {
         scene,
         options,
+        inquiry: Inquiry::new(control, &solution, answers, options.max_bytes),
         emitted: EmittedLight::default(),
         reflected: ReflectedLight::new(&solution, front),
         mean: colour_mean(solution.mean_irradiance),
@@ -150,7 +180,11 @@ pub fn bake(scene: &Scene, solution: Solution, options: &BakeOptions, control: C
         let fine = rounds.mesh();
         let samples = rounds.samples(&fine);
         let reflecting = &rounds.reflected.reflecting;
-        let points = residual(scene, &rounds.solution, &fine, &samples, reflecting, options.tolerance);
+        let inquiry = &mut rounds.inquiry;
+        let points = residual(scene, &rounds.solution, &fine, &samples, reflecting, options.tolerance, inquiry);
+        if inquiry.stopped() {
+            break best.unwrap_or((fine, samples, UNMEASURED));
+        }
         let (error, bias) = measured(&points, options.tolerance, rounds.reflectance);
         statistics.rounds += 1;
         let too_many = fine.triangles() > options.max_triangles;
@@ -173,7 +207,6 @@ pub fn bake(scene: &Scene, solution: Solution, options: &BakeOptions, control: C
         } else {
             rounds.share *= (NEXT_AIM / last).clamp(NEXT_SHARE[0], NEXT_SHARE[1]);
         }
-        (control.progress)(1.0 - 0.5f64.powi(statistics.rounds as i32));
     };
     (control.progress)(1.0);
     let samples: Vec<Vec3> = samples.iter().map(|value| value.max(Rgb::ZERO).as_vec3()).collect();
@@ -185,6 +218,7 @@ pub fn bake(scene: &Scene, solution: Solution, options: &BakeOptions, control: C
         triangles: triangles.len(),
         samples: samples.len(),
         rows: rounds.reflected.rows(),
+        bytes: rounds.inquiry.peak(),
         mesh: fine.mesh.statistics,
         ..statistics
     };
@@ -206,7 +240,7 @@ pub fn bake(scene: &Scene, solution: Solution, options: &BakeOptions, control: C
         error,
         provenance: Provenance::default(),
     };
-    Bake { baked, solution: rounds.solution, statistics }
+    Bake { baked, solution: rounds.solution, statistics, answers: rounds.inquiry.into_answers() }
 }
 
 /// The discontinuities on every polygon.
@@ -293,7 +327,8 @@ mod tests {
     fn baked_with(scene: &Scene, options: &BakeOptions, bounces: Option<u32>) -> (Baked, BakeStatistics) {
         let solution = solve(scene, &SolveOptions { bounces, ..SolveOptions::default() }, &|_| ());
         let progress = |fraction| assert!((0.0..=1.0).contains(&fraction));
-        let bake = bake(scene, solution, options, Control { progress: &progress, stop: &|| false });
+        let bake =
+            bake(scene, solution, options, Control { progress: &progress, stop: &|| false, interrupted: &|| false });
         (bake.baked, bake.statistics)
     }
 

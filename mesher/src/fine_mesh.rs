@@ -4,12 +4,15 @@
 //! light asks for, and light over reflectors is only carried over to it (`reflected_light`).
 
 use std::collections::HashMap;
+use std::sync::{Mutex, PoisonError};
 
 use glam::DVec3;
 use rayon::prelude::*;
 use scene::{DiscontinuityLine, Rgb, Scene};
 use solver::{Gather, NodeId, Shafts, Solution};
 
+use crate::guess::guessed_emitted;
+use crate::inquiry::Inquiry;
 use crate::probe::{colour_mean, probe_point};
 use crate::samples::QueryKey;
 use crate::small_patch::middle_of_small;
@@ -35,11 +38,11 @@ pub(crate) struct FineMesh {
     probed: Vec<Rgb>,
 }
 
-/// Irradiance from emitters at every point that was asked for so far, W·m⁻²: from mesh to mesh most stay.
+/// Which answer is the irradiance from emitters, at every point that was asked for so far: from mesh to mesh most stay.
 #[derive(Default)]
 pub(crate) struct EmittedLight {
-    light: HashMap<QueryKey, Rgb>,
-    /// By leaf.
+    light: HashMap<QueryKey, u32>,
+    /// What stands between each leaf and the emitters.
     shafts: HashMap<NodeId, Shafts>,
 }
 
@@ -53,6 +56,7 @@ impl FineMesh {
         (weight, count): (Weight, usize),
         dim: f64,
         known: &mut EmittedLight,
+        inquiry: &mut Inquiry<'_>,
     ) -> Self {
         let (leaves, lines) = divided_leaves(scene, solution, found, weight, count);
         let mesh = leaf_meshes(&edge_table(scene, &solution.cuts, &leaves));
@@ -63,10 +67,10 @@ impl FineMesh {
         let small = SMALL_PATCH * scene.size();
         let stands_in = |query: &SampleQuery| middle_of_small(solution, query, small).unwrap_or(*query);
         let queries: Vec<SampleQuery> = fine.table.queries.iter().map(stands_in).collect();
-        known.find(&gather, queries.iter().chain(&probes));
+        known.find(&gather, queries.iter().chain(&probes), inquiry);
         known.shafts.retain(|&element, _| solution.elements.is_leaf(element));
-        fine.emitted = known.at(&queries);
-        fine.probed = known.at(&probes);
+        fine.emitted = known.at(solution, &queries, inquiry);
+        fine.probed = known.at(solution, &probes, inquiry);
         fine
     }
 
@@ -104,27 +108,36 @@ impl FineMesh {
 
 impl EmittedLight {
     /// Evaluates what is not known yet, each leaf's points together.
-    fn find<'a>(&mut self, gather: &Gather<'_>, queries: impl Iterator<Item = &'a SampleQuery>) {
+    fn find<'a>(
+        &mut self,
+        gather: &Gather<'_>,
+        queries: impl Iterator<Item = &'a SampleQuery>,
+        inquiry: &mut Inquiry<'_>,
+    ) {
         let mut unknown: Vec<&SampleQuery> = queries.filter(|query| !self.light.contains_key(&query.key())).collect();
         unknown.sort_by_key(|query| query.element);
         unknown.dedup_by_key(|query| query.key());
-        let groups: Vec<&[&SampleQuery]> = unknown.chunk_by(|a, b| a.element == b.element).collect();
-        let found: Vec<(Vec<Rgb>, Shafts)> = groups
-            .par_iter()
-            .map(|group| {
-                let mut shafts = self.shafts.get(&group[0].element).cloned().unwrap_or_default();
-                let leaf = gather.over_emitters(group[0].element, &mut shafts);
-                (group.iter().map(|query| leaf.emitted(query.position, query.inward)).collect(), shafts)
-            })
-            .collect();
-        for (group, (values, shafts)) in groups.into_iter().zip(found) {
-            self.shafts.insert(group[0].element, shafts);
-            self.light.extend(group.iter().map(|query| query.key()).zip(values));
-        }
+        // What stands in a shaft is the same whoever looks first.
+        let shafts = Mutex::new(std::mem::take(&mut self.shafts));
+        let locked = || shafts.lock().unwrap_or_else(PoisonError::into_inner);
+        let found = inquiry.emitted(&unknown, |group| {
+            let element = group[0].element;
+            let mut own = locked().remove(&element).unwrap_or_default();
+            let leaf = gather.over_emitters(element, &mut own);
+            let light = group.iter().map(|query| leaf.emitted(query.position, query.inward)).collect();
+            locked().insert(element, own);
+            light
+        });
+        self.shafts = shafts.into_inner().unwrap_or_else(PoisonError::into_inner);
+        self.light.extend(unknown.iter().map(|query| query.key()).zip(found));
     }
 
-    fn at(&self, queries: &[SampleQuery]) -> Vec<Rgb> {
-        queries.par_iter().map(|query| self.light[&query.key()]).collect()
+    fn at(&self, solution: &Solution, queries: &[SampleQuery], inquiry: &Inquiry<'_>) -> Vec<Rgb> {
+        let known = |query: &SampleQuery| self.light.get(&query.key()).map(|&number| inquiry.light(number));
+        if inquiry.stopped() {
+            return guessed_emitted(solution, queries, &queries.iter().map(known).collect::<Vec<_>>());
+        }
+        queries.par_iter().map(|query| known(query).unwrap_or_default()).collect()
     }
 }
 

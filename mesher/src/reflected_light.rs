@@ -13,10 +13,11 @@ use std::collections::HashMap;
 
 use glam::{DVec2, DVec3, Vec3};
 use rayon::prelude::*;
-use scene::{Interpolant, Rgb, Scene};
+use scene::{Interpolant, Rgb, Scene, Seen};
 use solver::{ElementLight, Gather, NodeId, SeenNode, Solution, Visibility};
 
 use crate::fine_mesh::FineMesh;
+use crate::inquiry::Inquiry;
 use crate::probe::{at, colour_mean, probe_point};
 use crate::projection::Projection;
 use crate::samples::QueryKey;
@@ -27,8 +28,8 @@ use crate::{Leaf, Mesh, SampleQuery, SampleTable, edge_table, leaf_meshes, sampl
 pub(crate) struct ReflectedLight {
     /// The leaves of the coarse mesh, elements of the solution.
     front: Vec<NodeId>,
-    /// What a sample sees, by what it is asked: kept from mesh to mesh.
-    rows: HashMap<QueryKey, Row>,
+    /// Which answer is what a sample sees, by what it is asked: kept from mesh to mesh.
+    rows: HashMap<QueryKey, u32>,
     /// The source error that the rows were found with.
     source_error: f64,
     coarse: CoarseMesh,
@@ -37,15 +38,7 @@ pub(crate) struct ReflectedLight {
 }
 
 /// What a sample sees of the reflectors.
-type Row = Vec<Seen>;
-
-/// A [`SeenNode`] in half of the memory: f32 has the digits that light needs.
-#[derive(Clone, Copy)]
-struct Seen {
-    node: NodeId,
-    form_factor: f32,
-    offset: [f32; 2],
-}
+type Row = [Seen];
 
 /// A mesh of the front, without discontinuities.
 #[derive(Default)]
@@ -87,21 +80,34 @@ impl ReflectedLight {
         Self { front, rows: HashMap::new(), source_error: 0.0, coarse: CoarseMesh::default(), reflecting: Vec::new() }
     }
 
-    /// Finds the light: meshes the front, finds what new samples see, and sends light to and fro.
-    pub fn solve(&mut self, scene: &Scene, solution: &mut Solution, fine: &FineMesh, options: &Exchange) {
+    /// Finds the light: meshes the front, finds what new samples see, and sends light to and fro. If the bake is stopped meanwhile,
+    /// the light stays as it is.
+    pub fn solve(
+        &mut self,
+        scene: &Scene,
+        solution: &mut Solution,
+        fine: &FineMesh,
+        options: &Exchange,
+        inquiry: &mut Inquiry<'_>,
+    ) {
         let projection = Projection::new(fine, solution);
         let is_first = self.coarse.leaves.is_empty();
         if is_first {
-            self.solve_roughly(scene, solution, fine, &projection, options);
+            self.solve_roughly(scene, solution, fine, &projection, options, inquiry);
         }
-        self.coarse = CoarseMesh::new(scene, solution, &self.front);
+        let coarse = CoarseMesh::new(scene, solution, &self.front);
         let small = SMALL_PATCH * scene.size();
         let queries: Vec<[SampleQuery; 2]> =
-            self.coarse.table.queries.iter().map(|query| stand_ins(solution, query, small)).collect();
-        self.look(scene, solution, queries.as_flattened(), options, STALE);
+            coarse.table.queries.iter().map(|query| stand_ins(solution, query, small)).collect();
+        self.look(scene, solution, queries.as_flattened(), options, STALE, inquiry);
+        if inquiry.stopped() {
+            self.front = self.coarse.leaves.iter().map(|leaf| leaf.element).collect();
+            return;
+        }
+        self.coarse = coarse;
         let places = self.places(solution, fine);
         let rows: Vec<[&Row; 2]> =
-            queries.iter().map(|pair| pair.each_ref().map(|query| &self.rows[&query.key()])).collect();
+            queries.iter().map(|pair| pair.each_ref().map(|query| self.row(query, inquiry))).collect();
         let receive = |solution: &Solution| received_between(&Radiosity::of(scene, solution), &rows);
         // From darkness, so that what is dark stays exactly dark; later on from the light that is known, where all bounces count.
         let mut values =
@@ -128,6 +134,7 @@ impl ReflectedLight {
         fine: &FineMesh,
         projection: &Projection,
         options: &Exchange,
+        inquiry: &mut Inquiry<'_>,
     ) {
         let over_links = |solution: &Solution, element, position| {
             solution.reflected_over_links(element, offset(solution, element, position))
@@ -145,8 +152,11 @@ impl ReflectedLight {
         };
         self.reflecting = light(solution, &correction);
         solution.set_light(projection.planes(&self.reflecting));
-        self.look(scene, solution, &probes, options, STALE);
-        let rows: Vec<&Row> = probes.iter().map(|query| &self.rows[&query.key()]).collect();
+        self.look(scene, solution, &probes, options, STALE, inquiry);
+        if inquiry.stopped() {
+            return;
+        }
+        let rows: Vec<&Row> = probes.iter().map(|query| self.row(query, inquiry)).collect();
         for _ in 0..ROUGH_ITERATIONS {
             let values = Radiosity::of(scene, solution).received(&rows);
             for ((correction, value), query) in correction.iter_mut().zip(values).zip(&probes) {
@@ -162,11 +172,20 @@ impl ReflectedLight {
         total(&self.coarse, fine, &self.places(solution, fine))
     }
 
-    /// The errors of all leaves of the front, each at one point, by what such a point sees.
-    pub fn leaf_errors(&mut self, scene: &Scene, solution: &Solution, options: &Exchange) -> Vec<LeafError> {
+    /// The errors of all leaves of the front, each at one point, by what such a point sees. None if the bake is stopped.
+    pub fn leaf_errors(
+        &mut self,
+        scene: &Scene,
+        solution: &Solution,
+        options: &Exchange,
+        inquiry: &mut Inquiry<'_>,
+    ) -> Option<Vec<LeafError>> {
         let queries: Vec<SampleQuery> = self.front.iter().map(|&leaf| probe(solution, leaf)).collect();
-        self.look(scene, solution, &queries, options, STALE_PROBE);
-        let rows: Vec<&Row> = queries.iter().map(|query| &self.rows[&query.key()]).collect();
+        self.look(scene, solution, &queries, options, STALE_PROBE, inquiry);
+        if inquiry.stopped() {
+            return None;
+        }
+        let rows: Vec<&Row> = queries.iter().map(|query| self.row(query, inquiry)).collect();
         let exact = Radiosity::of(scene, solution).received(&rows);
         // The probe scatters, and so do the samples about it: what they differ by for that no division mends.
         let scatter = 2.0
@@ -180,7 +199,7 @@ impl ReflectedLight {
                 irradiance: colour_mean(exact),
             }
         };
-        queries.iter().zip(exact).enumerate().map(error).collect()
+        Some(queries.iter().zip(exact).enumerate().map(error).collect())
     }
 
     /// Number of points at which reflectors were looked at.
@@ -200,7 +219,15 @@ impl ReflectedLight {
     }
 
     /// Finds out what queries see that are not known yet, or were looked at when reflectors were coarser.
-    fn look(&mut self, scene: &Scene, solution: &Solution, queries: &[SampleQuery], options: &Exchange, stale: f64) {
+    fn look(
+        &mut self,
+        scene: &Scene,
+        solution: &Solution,
+        queries: &[SampleQuery],
+        options: &Exchange,
+        stale: f64,
+        inquiry: &mut Inquiry<'_>,
+    ) {
         let gather = Gather::with_source_error(scene, solution, options.source_error);
         // Rays are told by the source error how many they are, and by nothing else.
         if solution.visibility == Visibility::Rays && self.source_error != options.source_error {
@@ -211,25 +238,31 @@ impl ReflectedLight {
         let allowed = stale * gather.budget();
         let unknown: Vec<&SampleQuery> = queries
             .iter()
-            .filter(|query| self.rows.get(&query.key()).is_none_or(|row| is_stale(&gather, row, allowed)))
+            .filter(|query| self.rows.get(&query.key()).is_none_or(|&row| is_stale(&gather, inquiry.row(row), allowed)))
             .collect();
         let mut unknown = unknown;
         unknown.dedup_by_key(|query| query.key());
-        let groups: Vec<&[&SampleQuery]> = unknown.chunk_by(|a, b| a.element == b.element).collect();
-        let found: Vec<Vec<Row>> = groups
-            .par_iter()
-            .map(|group| {
-                let element = gather.over_reflectors(group[0].element);
-                let mut seen = Vec::new();
-                let row = |query: &&SampleQuery| {
-                    seen.clear();
-                    element.seen_nodes(query.position, query.inward, &mut seen);
-                    seen.iter().map(Seen::from).collect()
-                };
-                group.iter().map(row).collect()
-            })
-            .collect();
-        self.rows.extend(unknown.iter().map(|query| query.key()).zip(found.into_iter().flatten()));
+        let found = inquiry.rows(&unknown, solution.elements.nodes.len(), |group| {
+            let element = gather.over_reflectors(group[0].element);
+            let mut seen = Vec::new();
+            let row = |query: &&SampleQuery| {
+                seen.clear();
+                element.seen_nodes(query.position, query.inward, &mut seen);
+                seen.iter().map(in_few_digits).collect()
+            };
+            group.iter().map(row).collect()
+        });
+        self.rows.extend(unknown.iter().map(|query| query.key()).zip(found));
+    }
+
+    /// What a query sees, which has been found out.
+    fn row<'a>(&self, query: &SampleQuery, inquiry: &'a Inquiry<'_>) -> &'a Row {
+        inquiry.row(self.rows[&query.key()])
+    }
+
+    /// Whether there is any light yet.
+    pub fn is_known(&self) -> bool {
+        !self.coarse.leaves.is_empty()
     }
 
     /// Where the samples of a fine mesh lie on the coarse one; nowhere if that has no triangles there.
@@ -290,10 +323,9 @@ struct Place {
     t: f64,
 }
 
-impl From<&SeenNode> for Seen {
-    fn from(seen: &SeenNode) -> Self {
-        Self { node: seen.node, form_factor: seen.form_factor as f32, offset: seen.offset.as_vec2().to_array() }
-    }
+/// A [`SeenNode`] in half of the memory.
+fn in_few_digits(seen: &SeenNode) -> Seen {
+    Seen { node: seen.node, form_factor: seen.form_factor as f32, offset: seen.offset.as_vec2().to_array() }
 }
 
 /// Whether a row refers to nodes that have been divided since and whose light has turned out not to be linear, so that it
@@ -369,7 +401,8 @@ fn largest_move(from: &[Rgb], to: &[Rgb]) -> f64 {
     from.iter().zip(to).map(|(a, b)| (a - b).abs().max_element()).fold(0.0, f64::max)
 }
 
-fn offset(solution: &Solution, element: NodeId, position: DVec3) -> DVec2 {
+/// Where a position lies, from the middle of an element along its patch's u and v, metres.
+pub(crate) fn offset(solution: &Solution, element: NodeId, position: DVec3) -> DVec2 {
     let elements = &solution.elements;
     let Some(patch) = elements.patch_of(element) else { return DVec2::ZERO };
     elements.patches[patch as usize].along(position - elements.nodes[element as usize].centre)

@@ -11,15 +11,15 @@ use std::collections::HashSet;
 use glam::{DVec2, DVec3};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
-use rayon::prelude::*;
 use scene::{Bvh, Interpolant, Ray, Rgb, Scene, other_sides};
 use solver::{Gather, NodeId, SeenNode, Shafts, Solution, Visibility, hemisphere};
 
 use crate::fine_mesh::FineMesh;
+use crate::inquiry::Inquiry;
 use crate::probe::{at, colour_mean};
 
 /// Points of which a residual is taken. Twice as many halve the variance of the measured error at twice the cost.
-const POINTS: usize = 1024;
+pub(crate) const POINTS: usize = 1024;
 
 /// What each half may scatter by at a point, as a part of the tolerance; and the rays that it takes at least and at most.
 const SCATTER: f64 = 1.0;
@@ -44,7 +44,20 @@ pub(crate) struct ResidualPoint {
     pub triangle: u32,
 }
 
-/// Measures at a fixed set of points. `samples` are the bake's irradiances at the samples of the fine mesh, `reflecting` what
+impl ResidualPoint {
+    /// Its numbers, as they are remembered.
+    pub fn numbers(&self) -> [f64; 7] {
+        let [a, b] = self.differences;
+        [a.x, a.y, a.z, b.x, b.y, b.z, self.irradiance]
+    }
+
+    /// The point of a triangle that has such numbers.
+    pub fn of(triangle: u32, [ax, ay, az, bx, by, bz, irradiance]: [f64; 7]) -> Self {
+        Self { differences: [Rgb::new(ax, ay, az), Rgb::new(bx, by, bz)], irradiance, triangle }
+    }
+}
+
+/// Measures at a fixed set of points; at the first of them, if the bake is stopped meanwhile. `samples` are the bake's irradiances at the samples of the fine mesh, `reflecting` what
 /// its reflectors send, W·m⁻².
 pub(crate) fn residual(
     scene: &Scene,
@@ -53,9 +66,13 @@ pub(crate) fn residual(
     samples: &[Rgb],
     reflecting: &[Rgb],
     tolerance: f64,
+    inquiry: &mut Inquiry<'_>,
 ) -> Vec<ResidualPoint> {
+    if inquiry.stopped() {
+        return Vec::new();
+    }
     if solution.visibility == Visibility::Rays {
-        return residual_by_rays(scene, solution, fine, samples, tolerance);
+        return residual_by_rays(scene, solution, fine, samples, tolerance, inquiry);
     }
     let gather = Gather::with_even_nodes(scene, solution, STRAYS);
     let bvh = Bvh::of_triangles((0..fine.triangles()).map(|triangle| fine.corners(triangle)).collect());
@@ -86,41 +103,36 @@ pub(crate) fn residual(
         let known = node.map_or(Rgb::ZERO, |node| solution.light[node as usize].irradiance);
         Some(scene.reflectance(leaf.polygon) * (value(reflecting, hit.id as usize, hit.s, hit.t) - known))
     };
-    points(fine)
-        .into_par_iter()
-        .enumerate()
-        .map(|(number, (triangle, s, t))| {
-            let leaf = &fine.leaves[fine.mesh.triangles[triangle].leaf as usize];
-            let position = at(fine.corners(triangle), (s, t));
-            let element = gather.over(leaf.element);
-            let mut seen = Vec::new();
-            element.seen_nodes(position, DVec3::ZERO, &mut seen);
-            seen.iter_mut().for_each(|seen| seen.offset = DVec2::ZERO);
-            let known = element.emitted(position, DVec3::ZERO) + gather.irradiance_from(&seen);
-            let seen_nodes: HashSet<NodeId> = seen.iter().map(|seen| seen.node).collect();
-            let normal = normals[leaf.polygon as usize];
-            let mut random = ChaCha8Rng::seed_from_u64(number as u64);
-            let differs = |direction| correction(position, direction, leaf.polygon, &seen_nodes).unwrap_or(Rgb::ZERO);
-            // A ray scatters by what it finds, and finds a node as often as its form factor says: known before the first ray,
-            // where a few rays would miss the small bright node that matters most.
-            let square = |seen: &SeenNode| seen.form_factor * misfits[seen.node as usize];
-            let scatter = seen.iter().map(square).sum::<f64>();
-            let accepted = SCATTER * tolerance * colour_mean(known).max(mean);
-            let rays =
-                if seen.is_empty() { 0 } else { (scatter / (accepted * accepted)).clamp(RAYS[0], RAYS[1]) as u32 };
-            let halves = [(); 2].map(|()| {
-                let shift = DVec2::new(uniform(&mut random), uniform(&mut random));
-                let sum: Rgb = hemisphere(normal, rays, shift).map(differs).sum();
-                known + sum / f64::from(rays.max(1))
-            });
-            let baked = value(samples, triangle, s, t);
-            ResidualPoint {
-                differences: halves.map(|half| baked - half),
-                irradiance: colour_mean((halves[0] + halves[1]) / 2.0),
-                triangle: triangle as u32,
-            }
-        })
-        .collect()
+    inquiry.residuals(&points(fine), |number, (triangle, s, t)| {
+        let leaf = &fine.leaves[fine.mesh.triangles[triangle].leaf as usize];
+        let position = at(fine.corners(triangle), (s, t));
+        let element = gather.over(leaf.element);
+        let mut seen = Vec::new();
+        element.seen_nodes(position, DVec3::ZERO, &mut seen);
+        seen.iter_mut().for_each(|seen| seen.offset = DVec2::ZERO);
+        let known = element.emitted(position, DVec3::ZERO) + gather.irradiance_from(&seen);
+        let seen_nodes: HashSet<NodeId> = seen.iter().map(|seen| seen.node).collect();
+        let normal = normals[leaf.polygon as usize];
+        let mut random = ChaCha8Rng::seed_from_u64(number as u64);
+        let differs = |direction| correction(position, direction, leaf.polygon, &seen_nodes).unwrap_or(Rgb::ZERO);
+        // A ray scatters by what it finds, and finds a node as often as its form factor says: known before the first ray,
+        // where a few rays would miss the small bright node that matters most.
+        let square = |seen: &SeenNode| seen.form_factor * misfits[seen.node as usize];
+        let scatter = seen.iter().map(square).sum::<f64>();
+        let accepted = SCATTER * tolerance * colour_mean(known).max(mean);
+        let rays = if seen.is_empty() { 0 } else { (scatter / (accepted * accepted)).clamp(RAYS[0], RAYS[1]) as u32 };
+        let halves = [(); 2].map(|()| {
+            let shift = DVec2::new(uniform(&mut random), uniform(&mut random));
+            let sum: Rgb = hemisphere(normal, rays, shift).map(differs).sum();
+            known + sum / f64::from(rays.max(1))
+        });
+        let baked = value(samples, triangle, s, t);
+        ResidualPoint {
+            differences: halves.map(|half| baked - half),
+            irradiance: colour_mean((halves[0] + halves[1]) / 2.0),
+            triangle: triangle as u32,
+        }
+    })
 }
 
 /// The same in a scene whose reflected light is found by rays: each half looks anew, with rays of its own, at what the leaf
@@ -131,28 +143,26 @@ fn residual_by_rays(
     fine: &FineMesh,
     samples: &[Rgb],
     tolerance: f64,
+    inquiry: &mut Inquiry<'_>,
 ) -> Vec<ResidualPoint> {
     let halves = [1, 2].map(|turn| Gather::with_turned_rays(scene, solution, TURNED_ERROR * tolerance, turn));
-    points(fine)
-        .into_par_iter()
-        .map(|(triangle, s, t)| {
-            let leaf = &fine.leaves[fine.mesh.triangles[triangle].leaf as usize];
-            let position = at(fine.corners(triangle), (s, t));
-            let emitted = halves[0].over_emitters(leaf.element, &mut Shafts::default()).emitted(position, DVec3::ZERO);
-            let halves = halves.each_ref().map(|half| {
-                let mut seen = Vec::new();
-                half.over_reflectors(leaf.element).seen_nodes(position, DVec3::ZERO, &mut seen);
-                emitted + half.irradiance_from(&seen)
-            });
-            let baked = Interpolant::through(fine.table.triangles[triangle].map(|sample| samples[sample as usize]))
-                .evaluate(s, t);
-            ResidualPoint {
-                differences: halves.map(|half| baked - half),
-                irradiance: colour_mean((halves[0] + halves[1]) / 2.0),
-                triangle: triangle as u32,
-            }
-        })
-        .collect()
+    inquiry.residuals(&points(fine), |_, (triangle, s, t)| {
+        let leaf = &fine.leaves[fine.mesh.triangles[triangle].leaf as usize];
+        let position = at(fine.corners(triangle), (s, t));
+        let emitted = halves[0].over_emitters(leaf.element, &mut Shafts::default()).emitted(position, DVec3::ZERO);
+        let halves = halves.each_ref().map(|half| {
+            let mut seen = Vec::new();
+            half.over_reflectors(leaf.element).seen_nodes(position, DVec3::ZERO, &mut seen);
+            emitted + half.irradiance_from(&seen)
+        });
+        let baked =
+            Interpolant::through(fine.table.triangles[triangle].map(|sample| samples[sample as usize])).evaluate(s, t);
+        ResidualPoint {
+            differences: halves.map(|half| baked - half),
+            irradiance: colour_mean((halves[0] + halves[1]) / 2.0),
+            triangle: triangle as u32,
+        }
+    })
 }
 
 /// By node, the mean square of what the radiosity of the bake differs by from the node's mean, averaged over the colours.

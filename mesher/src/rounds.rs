@@ -7,6 +7,9 @@ use solver::{NodeId, Solution, Visibility};
 
 use crate::claimed_error::LARGEST_REFLECTANCE;
 use crate::fine_mesh::{EmittedLight, FineMesh};
+use crate::guess::guessed_reflected;
+use crate::inquiry::Inquiry;
+use crate::memory::held;
 use crate::probe::colour_mean;
 use crate::refinement::worst;
 use crate::reflected_light::{Exchange, ReflectedLight};
@@ -43,6 +46,7 @@ pub(crate) struct Rounds<'a> {
     pub options: &'a BakeOptions,
     pub solution: Solution,
     pub found: Vec<Vec<Discontinuity>>,
+    pub inquiry: Inquiry<'a>,
     pub emitted: EmittedLight,
     pub reflected: ReflectedLight,
     /// Mean irradiance of all surfaces, averaged over the colours, W·m⁻².
@@ -60,10 +64,11 @@ pub(crate) struct Rounds<'a> {
 }
 
 impl Rounds<'_> {
-    /// One round: divides leaves until both kinds of light are interpolated well enough; the mesh of the last division.
+    /// One round: divides leaves until both kinds of light are interpolated well enough; the mesh of the last division. If the bake is
+    /// stopped meanwhile, the last mesh all of whose light from emitters is known, or the first.
     pub fn mesh(&mut self) -> FineMesh {
         let mut fine = self.mesh_emitted();
-        if !self.solution.reflects() {
+        if !self.solution.reflects() || self.inquiry.stopped() {
             return fine;
         }
         for mesh in 1..=MESHES {
@@ -71,12 +76,16 @@ impl Rounds<'_> {
                 source_error: self.source_share * self.options.tolerance,
                 residual: RESIDUAL_SHARE * self.options.tolerance * self.mean * (1.0 - self.reflectance),
             };
-            self.reflected.solve(self.scene, &mut self.solution, &fine, &exchange);
+            self.reflected.solve(self.scene, &mut self.solution, &fine, &exchange, &mut self.inquiry);
+            if self.inquiry.stopped() {
+                break;
+            }
             if self.solution.visibility == Visibility::Rays {
                 let samples = self.reflected.irradiance(&self.solution, &fine);
                 self.take_means(&fine, &samples);
             }
-            let errors = self.reflected.leaf_errors(self.scene, &self.solution, &exchange);
+            let errors = self.reflected.leaf_errors(self.scene, &self.solution, &exchange, &mut self.inquiry);
+            let Some(errors) = errors else { break };
             self.reflected_errors = errors.iter().map(|error| (error.element, error.error)).collect();
             self.reflected_errors.sort_unstable_by_key(|error| error.0);
             let leaves: Vec<(NodeId, f64)> = errors
@@ -86,15 +95,18 @@ impl Rounds<'_> {
                     (error.element, error.error / own.max(self.mean))
                 })
                 .collect();
-            let divided = self.wanting(&leaves);
+            let (divided, excess) = self.wanting(&leaves);
+            self.inquiry.expect_division(excess);
             let by_chance = self.solution.visibility == Visibility::Rays
                 && mesh >= MESHES_BY_RAYS
                 && divided.len() * FEW > leaves.len();
             if divided.is_empty() || by_chance || mesh == MESHES || fine.triangles() > self.options.max_triangles {
                 break;
             }
-            if self.reflected.divide(&mut self.solution, &divided) {
-                fine = self.fine_mesh();
+            if self.reflected.divide(&mut self.solution, &divided)
+                && let Some(finer) = self.finer_mesh()
+            {
+                fine = finer;
             }
         }
         fine
@@ -104,12 +116,29 @@ impl Rounds<'_> {
     fn fine_mesh(&mut self) -> FineMesh {
         let BakeOptions { discontinuities, weight, .. } = *self.options;
         let lines = (weight, discontinuities as usize);
-        FineMesh::new(self.scene, &self.solution, &self.found, lines, DIM * self.options.tolerance, &mut self.emitted)
+        let dim = DIM * self.options.tolerance;
+        let fine =
+            FineMesh::new(self.scene, &self.solution, &self.found, lines, dim, &mut self.emitted, &mut self.inquiry);
+        self.inquiry.hold(held(&self.solution, &fine));
+        fine
+    }
+
+    /// The same; none if the bake was stopped before all of its light was known.
+    fn finer_mesh(&mut self) -> Option<FineMesh> {
+        let fine = self.fine_mesh();
+        (!self.inquiry.stopped()).then_some(fine)
     }
 
     /// Irradiance at the samples of a mesh, W·m⁻².
     pub fn samples(&self, fine: &FineMesh) -> Vec<Rgb> {
-        if self.solution.reflects() { self.reflected.irradiance(&self.solution, fine) } else { fine.emitted.clone() }
+        if !self.solution.reflects() {
+            return fine.emitted.clone();
+        }
+        if self.inquiry.stopped() && !self.reflected.is_known() {
+            let guess = |query| guessed_reflected(&self.solution, query, self.reflectance);
+            return fine.table.queries.iter().zip(&fine.emitted).map(|(query, light)| light + guess(query)).collect();
+        }
+        self.reflected.irradiance(&self.solution, fine)
     }
 
     /// What a scene without links is told of its light as a whole by a mesh of it.
@@ -159,14 +188,15 @@ impl Rounds<'_> {
                 leaves[leaf].1 += part * (error / own.max(self.mean)).powi(2);
             }
             leaves.iter_mut().for_each(|leaf| leaf.1 = leaf.1.sqrt());
-            let divided = self.wanting(&leaves);
+            let (divided, _) = self.wanting(&leaves);
             if divided.is_empty() || fine.triangles() > self.options.max_triangles {
                 break;
             }
             for leaf in divided {
                 self.solution.subdivide(leaf);
             }
-            fine = self.fine_mesh();
+            let Some(finer) = self.finer_mesh() else { break };
+            fine = finer;
         }
         fine
     }
@@ -190,8 +220,9 @@ impl Rounds<'_> {
             .collect()
     }
 
-    /// Of elements with their relative errors, those that are to be divided so that this round's share is kept; ascending.
-    fn wanting(&self, leaves: &[(NodeId, f64)]) -> Vec<NodeId> {
+    /// Of elements with their relative errors, those that are to be divided so that this round's share is kept, ascending; and the
+    /// error of all in such shares.
+    fn wanting(&self, leaves: &[(NodeId, f64)]) -> (Vec<NodeId>, f64) {
         let elements = &self.solution.elements;
         let area = |leaf: NodeId| elements.nodes[leaf as usize].area;
         let total: f64 = leaves.iter().map(|&(leaf, _)| area(leaf)).sum();
@@ -204,11 +235,12 @@ impl Rounds<'_> {
                 if divides { error * error * area(leaf) } else { 0.0 }
             })
             .collect();
-        if weighted.iter().sum::<f64>() <= allowed {
-            return Vec::new();
+        let square = weighted.iter().sum::<f64>();
+        if square <= allowed {
+            return (Vec::new(), 1.0);
         }
         let mut divided: Vec<NodeId> = worst(&weighted, AIM * allowed).into_iter().map(|i| leaves[i].0).collect();
         divided.sort_unstable();
-        divided
+        (divided, (square / allowed).sqrt())
     }
 }

@@ -38,7 +38,8 @@ impl SampleQuery {
     }
 }
 
-/// Is told the fraction that is done, 0..=1; from any thread, but never a smaller one than the last in a thread.
+/// Is told the fraction that is done as far as is foreseen, 0..=1; from any thread, and a smaller one than before where more
+/// is to do than was foreseen.
 pub type Progress<'a> = &'a (dyn Fn(f64) + Sync);
 
 /// Every sample once, and which of them each triangle uses.

@@ -17,6 +17,7 @@ mod rgb;
 mod scene;
 mod texture;
 mod texture_map;
+mod unfinished;
 
 pub use baked::{Baked, BakedElement, BakedError, BakedTriangle, DiscontinuityLine, EdgeKind, LineKind, Provenance};
 pub use bvh::{Bvh, Hit};
@@ -31,3 +32,4 @@ pub use rgb::{Rgb, luminance};
 pub use scene::{LARGEST_COORDINATE, Scene, SceneError, other_sides};
 pub use texture::Texture;
 pub use texture_map::TextureMap;
+pub use unfinished::{Answers, Seen, Unfinished};

@@ -196,7 +196,7 @@ mod tests {
         let floor = square(17.0, 9.0, 0.0, 1.0);
         let plane = Plane::through(&floor);
         let mut singles = Vec::new();
-        for faint in [0.0, 1e-3, 1e-2] {
+        for faint in [0.0, 5e-4, 5e-3] {
             let cut = tree.cut(&floor, &plane, faint);
             let mut all = cut.single.clone();
             for &group in &cut.groups {

@@ -1,0 +1,237 @@
+//! A bake's costly questions, in the order in which they are asked: answered, or remembered from a bake that was interrupted.
+//!
+//! Between any two answers the bake may be stopped. From then on nothing is answered or remembered any more, and whoever asks
+//! goes without: the answers are those to the first of all questions, whenever the bake was stopped.
+
+use std::hash::{DefaultHasher, Hash, Hasher};
+use std::ops::Range;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use rayon::prelude::*;
+use scene::{Answers, Rgb, Seen};
+use solver::{Solution, Visibility};
+
+use crate::forecast::{Forecast, Kind};
+use crate::memory::{EMITTED, TYPICAL_ROW, row};
+use crate::residual::ResidualPoint;
+use crate::{Control, SampleQuery};
+
+/// What is known, and what was asked so far of it.
+pub(crate) struct Inquiry<'a> {
+    control: Control<'a>,
+    forecast: Forecast<'a>,
+    answers: Answers,
+    /// How many questions were asked, and how many answers of each kind were given.
+    asked: usize,
+    emitted: usize,
+    rows: usize,
+    residuals: usize,
+    /// Bytes that may be held; that are held beside the answers, in answers that were given, and were at most.
+    most_bytes: usize,
+    held: usize,
+    given: usize,
+    row_bytes: usize,
+    peak: usize,
+    stopped: Option<Stop>,
+}
+
+/// Why a bake is stopped in its midst.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Stop {
+    Interrupted,
+    Memory,
+}
+
+impl<'a> Inquiry<'a> {
+    /// An inquiry that remembers `answers`, of a bake that may hold so many bytes.
+    pub fn new(control: Control<'a>, solution: &Solution, answers: Answers, most_bytes: usize) -> Self {
+        Self {
+            control,
+            forecast: Forecast::new(control, solution.visibility == Visibility::Rays, solution.reflects()),
+            answers,
+            asked: 0,
+            emitted: 0,
+            rows: 0,
+            residuals: 0,
+            most_bytes,
+            held: 0,
+            given: 0,
+            row_bytes: 0,
+            peak: 0,
+            stopped: None,
+        }
+    }
+
+    /// Takes note that leaves are as many times too coarse, in their error, as `excess` says.
+    pub fn expect_division(&mut self, excess: f64) {
+        self.forecast.expect_division(excess);
+    }
+
+    /// Takes note of the bytes that are held beside the answers.
+    pub fn hold(&mut self, bytes: usize) {
+        self.held = bytes;
+        self.peak = self.peak.max(self.held + self.given);
+    }
+
+    /// The most bytes that were held.
+    pub fn peak(&self) -> usize {
+        self.peak
+    }
+
+    /// Whether the bake was stopped, so that some questions went without an answer.
+    pub fn stopped(&self) -> bool {
+        self.stopped.is_some()
+    }
+
+    /// If the bake was interrupted, the answers, those that were remembered and not yet asked for among them.
+    pub fn into_answers(self) -> Option<Answers> {
+        (self.stopped == Some(Stop::Interrupted)).then_some(self.answers)
+    }
+
+    /// The light of emitters by its number.
+    pub fn light(&self, number: u32) -> Rgb {
+        self.answers.emitted[number as usize]
+    }
+
+    /// A row by its number.
+    pub fn row(&self, number: u32) -> &[Seen] {
+        &self.answers.rows[number as usize]
+    }
+
+    /// The light of emitters at the first of the queries: all, unless the bake is stopped. `answer` finds it for queries of one
+    /// element.
+    pub fn emitted(
+        &mut self,
+        queries: &[&SampleQuery],
+        answer: impl Fn(&[&SampleQuery]) -> Vec<Rgb> + Sync,
+    ) -> Range<u32> {
+        let first = self.emitted;
+        if self.ask((0u8, queries.iter().map(|query| query.key())), queries.len() * EMITTED) {
+            let known = queries.len().min(self.answers.emitted.len() - first);
+            let found = self.find(Kind::Emitted, &by_element(&queries[known..]), answer);
+            self.answers.emitted.extend(found);
+            self.emitted = self.answers.emitted.len().min(first + queries.len());
+            self.given += (self.emitted - first) * EMITTED;
+        }
+        first as u32..self.emitted as u32
+    }
+
+    /// The rows of the first of the queries: all, unless the bake is stopped. Rows name nodes below `nodes`.
+    pub fn rows(
+        &mut self,
+        queries: &[&SampleQuery],
+        nodes: usize,
+        answer: impl Fn(&[&SampleQuery]) -> Vec<Box<[Seen]>> + Sync,
+    ) -> Range<u32> {
+        let first = self.rows;
+        let expected = self.row_bytes.checked_div(first).unwrap_or(TYPICAL_ROW);
+        if self.ask((1u8, queries.iter().map(|query| query.key())), queries.len() * expected) {
+            let mut known = queries.len().min(self.answers.rows.len() - first);
+            let is_strange = |row: &[Seen]| row.iter().any(|seen| seen.node as usize >= nodes);
+            // Only a forged file has such.
+            if let Some(strange) = self.answers.rows[first..first + known].iter().position(|row| is_strange(row)) {
+                known = strange;
+                self.rows = first + known;
+                self.forget();
+            }
+            let found = self.find(Kind::Rows, &by_element(&queries[known..]), answer);
+            self.answers.rows.extend(found);
+            self.rows = self.answers.rows.len().min(first + queries.len());
+            let bytes = self.answers.rows[first..self.rows].iter().map(|found| row(found.len())).sum::<usize>();
+            self.given += bytes;
+            self.row_bytes += bytes;
+        }
+        first as u32..self.rows as u32
+    }
+
+    /// What is measured at the first of the points, triangles with barycentrics: at all, unless the bake is stopped.
+    pub fn residuals(
+        &mut self,
+        points: &[(usize, f64, f64)],
+        measure: impl Fn(usize, (usize, f64, f64)) -> ResidualPoint + Sync,
+    ) -> Vec<ResidualPoint> {
+        let first = self.residuals;
+        let key = |&(triangle, s, t): &(usize, f64, f64)| (triangle, s.to_bits(), t.to_bits());
+        if self.ask((2u8, points.iter().map(key)), 0) {
+            let known = points.len().min(self.answers.residuals.len() - first);
+            let unknown: Vec<usize> = (known..points.len()).collect();
+            let found = self.find(Kind::Residuals, &unknown.chunks(1).collect::<Vec<_>>(), |numbers| {
+                numbers.iter().map(|&number| measure(number, points[number]).numbers()).collect()
+            });
+            self.answers.residuals.extend(found);
+            self.residuals = self.answers.residuals.len().min(first + points.len());
+        }
+        let known = self.answers.residuals[first..self.residuals].iter().zip(points);
+        known.map(|(&numbers, point)| ResidualPoint::of(point.0 as u32, numbers)).collect()
+    }
+
+    /// Begins a question whose answers are expected to take so many bytes; not where the bake has been stopped, or is by them. If it is another one than was remembered in its place, nothing that was
+    /// remembered from there on is taken for an answer.
+    fn ask<K: Hash>(&mut self, (kind, keys): (u8, impl ExactSizeIterator<Item = K>), bytes: usize) -> bool {
+        if self.stopped.is_some() {
+            return false;
+        }
+        if self.held + self.given + bytes > self.most_bytes {
+            self.stopped = Some(Stop::Memory);
+            return false;
+        }
+        self.peak = self.peak.max(self.held + self.given + bytes);
+        let mut checksum = DefaultHasher::new();
+        (kind, keys.len()).hash(&mut checksum);
+        keys.for_each(|key| key.hash(&mut checksum));
+        let checksum = checksum.finish();
+        if self.answers.questions.get(self.asked) != Some(&checksum) {
+            self.forget();
+            self.answers.questions.truncate(self.asked);
+            self.answers.questions.push(checksum);
+        }
+        self.asked += 1;
+        true
+    }
+
+    /// Forgets the answers that have not been given yet.
+    fn forget(&mut self) {
+        self.answers.emitted.truncate(self.emitted);
+        self.answers.rows.truncate(self.rows);
+        self.answers.residuals.truncate(self.residuals);
+    }
+
+    /// The answers to the first of the questions, which are answered a group at a time: to all, unless the bake is stopped. Threads take groups one after
+    /// another, so that hardly an answer is lost when they stop.
+    fn find<Q: Sync, A: Send>(
+        &mut self,
+        kind: Kind,
+        groups: &[&[Q]],
+        answer: impl Fn(&[Q]) -> Vec<A> + Sync,
+    ) -> Vec<A> {
+        let done = AtomicUsize::new(0);
+        let all = groups.iter().map(|group| group.len()).sum::<usize>() as f64;
+        let stretch = self.forecast.stretch(kind, all);
+        let mut found: Vec<(usize, Vec<A>)> = groups
+            .iter()
+            .enumerate()
+            .par_bridge()
+            .filter_map(|(number, group)| {
+                let answer = (!(self.control.interrupted)()).then(|| (number, answer(group)));
+                stretch.advance((done.fetch_add(group.len(), Ordering::Relaxed) + group.len()) as f64 / all);
+                answer
+            })
+            .collect();
+        let seconds = stretch.seconds();
+        self.forecast.end(kind, seconds, all);
+        found.sort_unstable_by_key(|answer| answer.0);
+        if found.len() < groups.len() {
+            self.stopped = Some(Stop::Interrupted);
+        }
+        (0..)
+            .zip(found)
+            .take_while(|(place, (number, _))| place == number)
+            .flat_map(|(_, (_, answers))| answers)
+            .collect()
+    }
+}
+
+/// Queries of one element that stand together.
+fn by_element<'a, 'q>(queries: &'a [&'q SampleQuery]) -> Vec<&'a [&'q SampleQuery]> {
+    queries.chunk_by(|a, b| a.element == b.element).collect()
+}
