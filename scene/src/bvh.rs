@@ -19,6 +19,9 @@ const PADDING: f64 = 4e-6;
 /// so nothing is near enough for that.
 const LIBRARY_UNIT: f32 = 1.0 / (1u32 << 24) as f32;
 
+/// The nearest hit that the library is told of, in its units: behind a nearer one it would skip boxes that hold a nearer still.
+const NEAREST: f32 = 2e-4;
+
 /// The least component of a direction, as a fraction of the largest, by which boxes are sought: below, what a ray moves across
 /// all that f32 tells apart is less than a box's padding.
 const LEAST_COMPONENT: f64 = 1e-12;
@@ -112,7 +115,7 @@ impl Bvh {
                         best = Some((distance, slot, s, t));
                     }
                     // Rounded up, so that boxes at the same distance are still visited.
-                    (distance as f32) / LIBRARY_UNIT * (1.0 + 4.0 * f32::EPSILON)
+                    ((distance as f32) / LIBRARY_UNIT * (1.0 + 4.0 * f32::EPSILON)).max(NEAREST)
                 }
                 _ => f32::INFINITY,
             }
@@ -237,7 +240,8 @@ fn library_ray(ray: &Ray, farthest: f32) -> obvhs::ray::Ray {
     });
     obvhs::ray::Ray {
         origin: ray.origin.as_vec3a(),
-        direction: ray.direction.as_vec3a(),
+        // Only its signs are asked for, and they must be those of the inverse: −0 and what f32 rounds to it are neither.
+        direction: Vec3A::from_array(inverse.map(|component| 1f32.copysign(component))),
         inv_direction: Vec3A::from_array(inverse),
         tmin: 0.0,
         tmax: farthest / LIBRARY_UNIT,
@@ -282,8 +286,11 @@ mod tests {
             for i in 5000..6000 {
                 let origin = (point(i) * 2.0 - 0.5) * scale;
                 let mut direction = point(i + 1000) * 1.5 * scale - origin;
-                if i % 10 == 0 {
-                    direction.x = 0.0;
+                match i % 10 {
+                    0 => direction.x = 0.0,
+                    1 => direction.y = -0.0,
+                    2 => direction.z = -1e-60,
+                    _ => {}
                 }
                 let ray = Ray { origin, direction };
                 let sheared = ShearedRay::new(&ray);
