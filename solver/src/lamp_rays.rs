@@ -51,7 +51,7 @@ impl LeafGather<'_> {
     }
 
     /// Light from the groups of emitters that are faint at the leaf, W·m⁻²: one place of each is tried.
-    pub(crate) fn from_faint_groups(&self, from: &Viewpoint) -> Rgb {
+    pub(crate) fn light_of_faint_groups(&self, from: &Viewpoint) -> Rgb {
         let gather = self.gather;
         let Some(tree) = gather.emitter_tree().filter(|_| !self.groups.is_empty()) else { return Rgb::ZERO };
         let origin = from.position + from.inward * (ASIDE * gather.geometry.size);

@@ -316,7 +316,7 @@ impl LeafGather<'_> {
             }
         }
         if wanted != Light::Reflected {
-            total += self.from_faint_groups(&from);
+            total += self.light_of_faint_groups(&from);
         }
         total
     }
