@@ -57,16 +57,16 @@ pub fn emitters(scene: &Scene) -> Vec<Emitter> {
 pub fn emitter_tree(scene: &Scene, emitters: &[Emitter]) -> LightTree {
     let power = |polygon: u32| luminance(scene.material(polygon).exitance()) * scene.area(polygon);
     let light = |emitter: &Emitter| {
-        let [first, ..] = emitter.polygons[..] else { return None };
         if emitter.body.is_empty() {
-            return Some(Light::of_outline(&scene.outline(first), scene.plane(first).normal, first, power(first)));
+            let polygon = emitter.polygons[0];
+            return Light::of_outline(&scene.outline(polygon), scene.plane(polygon).normal, polygon, power(polygon));
         }
         let low = emitter.body.iter().copied().fold(DVec3::INFINITY, DVec3::min);
         let high = emitter.body.iter().copied().fold(DVec3::NEG_INFINITY, DVec3::max);
         let surfaces = emitter.polygons.iter().map(|&polygon| (polygon, power(polygon))).collect();
-        Some(Light { low, high, axis: None, surfaces })
+        Light { low, high, axis: None, surfaces }
     };
-    LightTree::new(&emitters.iter().filter_map(light).collect::<Vec<Light>>())
+    LightTree::new(&emitters.iter().map(light).collect::<Vec<Light>>())
 }
 
 /// The corners of the convex body that polygons close; none if they do not.

@@ -203,18 +203,23 @@ impl<'a> Gather<'a> {
     /// The same for light over reflectors alone.
     pub fn over_reflectors(&'a self, element: NodeId) -> LeafGather<'a> {
         match self.emitter_tree {
-            Some(_) => self.over_prominent(element, Vec::new()),
+            Some(_) => {
+                let elements = &self.solution.elements;
+                let polygon = elements.polygon_of(element).unwrap_or_default();
+                let plane = self.geometry.plane(polygon);
+                let prominent = |rays: &RayGather| rays.prominent(self.solution, element, &plane);
+                LeafGather {
+                    gather: self,
+                    polygon,
+                    centre: elements.nodes[element as usize].centre,
+                    sources: Vec::new(),
+                    groups: Vec::new(),
+                    prominent: self.rays().map_or_else(Vec::new, prominent),
+                    blockers: Vec::new(),
+                }
+            }
             None => self.over_sources(element, |_| true),
         }
-    }
-
-    /// A gather over sources, and over the reflectors that are prominent at the element.
-    pub(crate) fn over_prominent(&'a self, element: NodeId, sources: Vec<Source>) -> LeafGather<'a> {
-        let polygon = self.solution.elements.polygon_of(element).unwrap_or_default();
-        let plane = self.geometry.plane(polygon);
-        let prominent = self.rays().map_or_else(Vec::new, |rays| rays.prominent(self.solution, element, &plane));
-        let centre = self.solution.elements.nodes[element as usize].centre;
-        LeafGather { gather: self, polygon, centre, sources, groups: Vec::new(), prominent, blockers: Vec::new() }
     }
 
     /// How much light, luminance, W·m⁻², the plane over a reflector's node misplaces at a point with the given form factor to

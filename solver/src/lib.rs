@@ -15,6 +15,7 @@ mod form_factor;
 mod geometry;
 mod irradiance;
 mod lamp_rays;
+mod lattice;
 mod leaf_gather;
 mod light_tree;
 mod linear_fit;
@@ -37,8 +38,8 @@ pub use cut::{contact_lines, cut_polygon};
 pub use element::{Elements, Node, NodeId, NodeKind, Patch};
 pub use form_factor::{exchange, form_factor, form_factor_at, point_form_factor};
 pub use irradiance::{Contact, Gather};
+pub use lattice::hemisphere;
 pub use leaf_gather::{LeafGather, SeenNode};
-pub use ray_gather::hemisphere;
 pub use shafts::Shafts;
 pub use solution::{
     BlockerLists, Convergence, Cut, ElementLight, Interaction, Link, LinkSource, Solution, SolveOptions, Visibility,

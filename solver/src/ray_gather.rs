@@ -6,18 +6,14 @@
 //! what is divided is the surfaces, so that nothing counts twice and nothing is lost. Nothing leaks: a ray stops where it
 //! should. What it costs grows with the logarithm of the number of polygons.
 
-use std::f64::consts::TAU;
-
 use glam::{DVec2, DVec3};
 use scene::{Bvh, Plane, Ray, Scene, luminance, other_sides};
 
 use crate::form_factor::form_factor_at;
+use crate::lattice::{Arriving, Fan, STEP, hemisphere, shift};
 use crate::leaf_gather::SeenNode;
 use crate::light_tree::{Light, LightTree};
 use crate::{NodeId, Patch, Solution};
-
-/// The powers of the plastic number, whose multiples fill the square evenly (Roberts 2018).
-pub(crate) const STEP: [f64; 2] = [0.754_877_666_246_692_8, 0.569_840_290_998_053_3];
 
 /// Rays from a point for a source error of `RAYS_ERROR`. What rays that are spread evenly miss falls with their number to the
 /// power of −3/4.
@@ -45,7 +41,7 @@ pub(crate) const ASIDE: f64 = 1e-7;
 const NEGLIGIBLE: f64 = 2.0;
 
 /// Rays that tell what is hidden of a node, at least: of a dim one and of a bright one. A large node gets as many as would meet
-/// it of those over the hemisphere. To stop early where the first agree would take what is mostly seen for seen wholly.
+/// it of those over the hemisphere.
 const AIMED_RAYS: [u32; 2] = [1, 2];
 
 /// Where rays start: a position just in front of all that touches it, on a polygon.
@@ -188,36 +184,22 @@ impl RayGather {
         }
         let Some(patch) = elements.patch_of(node) else { return };
         let outline = elements.outline(node);
-        let normal = self.normals[polygon as usize];
-        let areas: Vec<f64> =
-            outline[1..].windows(2).map(|edge| (edge[0] - outline[0]).cross(edge[1] - outline[0]).length()).collect();
-        let total: f64 = areas.iter().sum();
         let is_bright = self.reflectances[polygon as usize] * luminance(light.irradiance) * form_factor > self.budget;
         let rays =
             AIMED_RAYS[usize::from(is_bright)].max((form_factor * f64::from(self.rays[from.polygon as usize])) as u32);
-        let (mut arrives, mut all, mut middle) = (0.0, 0.0, DVec3::ZERO);
-        for i in 0..rays {
-            let place = spread_over(outline, &areas, total, from.shift + DVec2::splat(f64::from(node) * STEP[0]), i);
-            let way = place - from.position;
-            let square = way.length_squared();
-            let weight =
-                from.normal.dot(way).max(0.0) * normal.dot(way).abs() / (square * square).max(f64::MIN_POSITIVE);
-            if weight <= 0.0 {
-                continue;
-            }
-            all += weight;
+        let is_blocked = |place: DVec3| {
             let hides = |triangle: u32| {
                 let met = elements.patches[self.patches[triangle as usize] as usize].polygon;
                 !self.is_own(from.polygon, met) && !self.is_own(polygon, met)
             };
-            if !self.bvh.is_blocked_among(from.position, place, hides) {
-                arrives += weight;
-                middle += place * weight;
-            }
-        }
-        if arrives > 0.0 {
-            let offset = elements.patches[patch as usize].along(middle / arrives - record.centre);
-            seen.push(SeenNode { node, form_factor: form_factor * arrives / all, offset });
+            self.bvh.is_blocked_among(from.position, place, hides)
+        };
+        let shift = from.shift + DVec2::splat(f64::from(node) * STEP.x);
+        let Arriving { share, middle } =
+            Fan::new(outline).arriving(from.position, from.normal, (shift, rays), is_blocked);
+        if share > 0.0 {
+            let offset = elements.patches[patch as usize].along(middle - record.centre);
+            seen.push(SeenNode { node, form_factor: form_factor * share, offset });
         }
     }
 
@@ -309,44 +291,6 @@ fn merge(seen: &mut Vec<SeenNode>, first: usize) {
     seen.truncate(end);
 }
 
-/// Directions about a normal with a density of the cosine over π: a rank-1 lattice, shifted, spread evenly.
-pub fn hemisphere(normal: DVec3, count: u32, shift: DVec2) -> impl Iterator<Item = DVec3> {
-    let (x, y) = normal.any_orthonormal_pair();
-    (0..count).map(move |i| {
-        let u = (shift.x + f64::from(i) * STEP[0]).fract();
-        let (sin, cos) = (TAU * (shift.y + f64::from(i) * STEP[1]).fract()).sin_cos();
-        (x * cos + y * sin) * u.sqrt() + normal * (1.0 - u).sqrt()
-    })
-}
-
-/// The place number `i` of places spread evenly over a convex outline by a shifted lattice; fan of triangles has the given areas.
-pub(crate) fn spread_over(outline: &[DVec3], areas: &[f64], total: f64, shift: DVec2, i: u32) -> DVec3 {
-    let (u, v) = ((shift.x + f64::from(i) * STEP[0]).fract(), (shift.y + f64::from(i) * STEP[1]).fract());
-    let mut left = u * total;
-    let triangle = areas.iter().position(|&area| {
-        left -= area;
-        left < 0.0
-    });
-    let triangle = triangle.unwrap_or(areas.len() - 1);
-    let u = (1.0 + left / areas[triangle]).clamp(0.0, 1.0);
-    let (s, t) = (u.sqrt() * (1.0 - v), u.sqrt() * v);
-    outline[0] + (outline[triangle + 1] - outline[0]) * s + (outline[triangle + 2] - outline[0]) * t
-}
-
-/// A shift of the lattices that is another for every position, so that what one point misses its neighbour finds, and for
-/// every turn.
-pub(crate) fn shift(position: DVec3, turn: u32) -> DVec2 {
-    // The finalizer of MurmurHash3 over the position's bits.
-    let mix = |mut bits: u64| {
-        bits = (bits ^ (bits >> 33)).wrapping_mul(0xff51_afd7_ed55_8ccd);
-        bits = (bits ^ (bits >> 33)).wrapping_mul(0xc4ce_b9fe_1a85_ec53);
-        bits ^ (bits >> 33)
-    };
-    let [x, y, z] = position.to_array().map(f64::to_bits);
-    let first = mix(x ^ mix(y ^ mix(z ^ mix(u64::from(turn) + 1))));
-    DVec2::new(first as f64, mix(first) as f64) / (u64::MAX as f64 + 1.0)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -391,14 +335,5 @@ mod tests {
         let mean = sums.iter().sum::<f64>() / 40.0;
         let square = (sums.iter().map(|x| x * x).sum::<f64>() / 40.0).sqrt();
         assert!(mean.abs() < 0.01 && square < 0.05, "{mean} {square}");
-    }
-
-    #[test]
-    fn directions_are_spread_by_the_cosine() {
-        let mean =
-            |f: &dyn Fn(DVec3) -> f64| hemisphere(DVec3::Y, 1000, shift(DVec3::ONE, 0)).map(f).sum::<f64>() / 1000.0;
-        assert!((mean(&|d| d.y) - 2.0 / 3.0).abs() < 2e-3);
-        assert!((mean(&|d| d.x * d.x) - 0.25).abs() < 2e-3 && mean(&|d| d.z).abs() < 2e-3);
-        assert_eq!(hemisphere(DVec3::Z, 0, DVec2::ZERO).count(), 0);
     }
 }
