@@ -136,8 +136,8 @@ pub struct BakeStatistics {
 
 /// Bakes a solved scene.
 ///
-/// A bake that was interrupted, or held too much, is the best one that was measured. If none was, it is the first mesh: with the light that is known, the best
-/// guess where none is (`guess`), and an error without a limit.
+/// A bake that was interrupted, or held too much, is the best one that was measured. If none was, it is the first mesh: with the
+/// light that is known, the best guess where none is (`guess`), and an error without a limit.
 pub fn bake(scene: &Scene, solution: Solution, options: &BakeOptions, control: Control<'_>) -> Bake {
     resume(scene, solution, options, control, Answers::default())
 }

@@ -165,8 +165,8 @@ impl<'a> Inquiry<'a> {
         known.map(|(&numbers, point)| ResidualPoint::of(point.0 as u32, numbers)).collect()
     }
 
-    /// Begins a question whose answers are expected to take so many bytes; not where the bake has been stopped, or is by them. If it is another one than was remembered in its place, nothing that was
-    /// remembered from there on is taken for an answer.
+    /// Begins a question whose answers are expected to take so many bytes; not where the bake has been stopped, or is by them. If it
+    /// is another one than was remembered in its place, nothing that was remembered from there on is taken for an answer.
     fn ask<K: Hash>(&mut self, (kind, keys): (u8, impl ExactSizeIterator<Item = K>), bytes: usize) -> bool {
         if self.stopped.is_some() {
             return false;
@@ -196,8 +196,8 @@ impl<'a> Inquiry<'a> {
         self.answers.residuals.truncate(self.residuals);
     }
 
-    /// The answers to the first of the questions, which are answered a group at a time: to all, unless the bake is stopped. Threads take groups one after
-    /// another, so that hardly an answer is lost when they stop.
+    /// The answers to the first of the questions, which are answered a group at a time: to all, unless the bake is stopped. Threads
+    /// take groups one after another, so that hardly an answer is lost when they stop.
     fn find<Q: Sync, A: Send>(
         &mut self,
         kind: Kind,

@@ -57,8 +57,8 @@ impl ResidualPoint {
     }
 }
 
-/// Measures at a fixed set of points; at the first of them, if the bake is stopped meanwhile. `samples` are the bake's irradiances at the samples of the fine mesh, `reflecting` what
-/// its reflectors send, W·m⁻².
+/// Measures at a fixed set of points; at the first of them, if the bake is stopped meanwhile. `samples` are the bake's
+/// irradiances at the samples of the fine mesh, `reflecting` what its reflectors send, W·m⁻².
 pub(crate) fn residual(
     scene: &Scene,
     solution: &Solution,

@@ -64,8 +64,8 @@ pub(crate) struct Rounds<'a> {
 }
 
 impl Rounds<'_> {
-    /// One round: divides leaves until both kinds of light are interpolated well enough; the mesh of the last division. If the bake is
-    /// stopped meanwhile, the last mesh all of whose light from emitters is known, or the first.
+    /// One round: divides leaves until both kinds of light are interpolated well enough; the mesh of the last division. If the
+    /// bake is stopped meanwhile, the last mesh all of whose light from emitters is known, or the first.
     pub fn mesh(&mut self) -> FineMesh {
         let mut fine = self.mesh_emitted();
         if !self.solution.reflects() || self.inquiry.stopped() {
