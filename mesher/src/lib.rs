@@ -25,6 +25,7 @@ mod residual;
 mod rounds;
 mod samples;
 mod small_patch;
+mod stand_ins;
 #[cfg(test)]
 mod testing;
 mod weight;

@@ -21,7 +21,7 @@ use crate::inquiry::Inquiry;
 use crate::probe::{at, colour_mean, probe_point};
 use crate::projection::Projection;
 use crate::samples::QueryKey;
-use crate::small_patch::middle_of_small;
+use crate::stand_ins::StandIns;
 use crate::{Leaf, Mesh, SampleQuery, SampleTable, edge_table, leaf_meshes, sample_table};
 
 /// Light over reflectors on all surfaces.
@@ -96,22 +96,20 @@ impl ReflectedLight {
             self.solve_roughly(scene, solution, fine, &projection, options, inquiry);
         }
         let coarse = CoarseMesh::new(scene, solution, &self.front);
-        let small = SMALL_PATCH * scene.size();
-        let queries: Vec<[SampleQuery; 2]> =
-            coarse.table.queries.iter().map(|query| stand_ins(solution, query, small)).collect();
-        self.look(scene, solution, queries.as_flattened(), options, STALE, inquiry);
+        let stand_ins = StandIns::new(scene, solution, &coarse.leaves, &coarse.mesh, &coarse.table);
+        self.look(scene, solution, &stand_ins.queries, options, STALE, inquiry);
         if inquiry.stopped() {
             self.front = self.coarse.leaves.iter().map(|leaf| leaf.element).collect();
             return;
         }
         self.coarse = coarse;
         let places = self.places(solution, fine);
-        let rows: Vec<[&Row; 2]> =
-            queries.iter().map(|pair| pair.each_ref().map(|query| self.row(query, inquiry))).collect();
-        let receive = |solution: &Solution| received_between(&Radiosity::of(scene, solution), &rows);
+        let rows: Vec<&Row> = stand_ins.queries.iter().map(|query| self.row(query, inquiry)).collect();
+        let receive = |solution: &Solution| stand_ins.of_samples(&Radiosity::of(scene, solution).received(&rows));
+        let samples = self.coarse.table.queries.len();
         // From darkness, so that what is dark stays exactly dark; later on from the light that is known, where all bounces count.
         let mut values =
-            if is_first || solution.bounces.is_some() { vec![Rgb::ZERO; queries.len()] } else { receive(solution) };
+            if is_first || solution.bounces.is_some() { vec![Rgb::ZERO; samples] } else { receive(solution) };
         for _ in 0..solution.bounces.unwrap_or(MOST_ITERATIONS) {
             self.coarse.values = values;
             self.reflecting = total(&self.coarse, fine, &places);
@@ -187,15 +185,16 @@ impl ReflectedLight {
         }
         let rows: Vec<&Row> = queries.iter().map(|query| self.row(query, inquiry)).collect();
         let exact = Radiosity::of(scene, solution).received(&rows);
+        let gather = Gather::with_source_error(scene, solution, options.source_error);
         // The probe scatters, and so do the samples about it: what they differ by for that no division mends.
-        let scatter = 2.0
-            * BEYOND_CHANCE.powi(2)
-            * Gather::with_source_error(scene, solution, options.source_error).scatter().powi(2);
+        let scatter = |element| 2.0 * (BEYOND_CHANCE * gather.scatter(element)).powi(2);
         let error = |(leaf, (query, exact)): (usize, (&SampleQuery, Rgb))| {
             let difference = self.coarse.place(leaf, query).map_or(Rgb::ZERO, |place| self.coarse.at(place)) - exact;
             LeafError {
                 element: query.element,
-                error: (colour_mean(difference * difference) - scatter * colour_mean(exact).powi(2)).max(0.0).sqrt(),
+                error: (colour_mean(difference * difference) - scatter(query.element) * colour_mean(exact).powi(2))
+                    .max(0.0)
+                    .sqrt(),
                 irradiance: colour_mean(exact),
             }
         };
@@ -357,39 +356,6 @@ impl Radiosity {
         };
         rows.par_iter().with_min_len(64).map(|row| row.iter().map(part).sum::<Vec3>().as_dvec3()).collect()
     }
-}
-
-/// The same for samples that two rows stand in for: what lies on the line through the two at the sample.
-fn received_between(radiosity: &Radiosity, rows: &[[&Row; 2]]) -> Vec<Rgb> {
-    let values = radiosity.received(rows.as_flattened());
-    values.chunks(2).map(|pair| (2.0 * pair[0] - pair[1]).max(Rgb::ZERO)).collect()
-}
-
-/// Length of patches, as a fraction of the scene's size, below which light over reflectors is taken for the same all over
-/// them until a probe says otherwise. Larger leaves more to probes.
-const SMALL_PATCH: f64 = 0.02;
-
-/// How far from a contact its stand-ins lie, as parts of the way to the middle of the element. Nearer ones feel more of what
-/// is special to the contact, farther ones miss more of what curves.
-const ASIDE: f64 = 0.07;
-
-/// Where a sample is looked at: twice at its own place, or at a contact at two places aside.
-///
-/// At a contact the slope of the light over reflectors is infinite (it goes with d ln d at the distance d), and an interpolant
-/// through the limit is off over all of the leaf. One through what the light is a little aside, continued in a straight line,
-/// is off in a strip.
-///
-/// A patch of a scene of many that is shorter than `small`, metres, and has not been divided is looked at once, in its middle.
-fn stand_ins(solution: &Solution, query: &SampleQuery, small: f64) -> [SampleQuery; 2] {
-    if let Some(middle) = middle_of_small(solution, query, small) {
-        return [middle; 2];
-    }
-    if query.inward == DVec3::ZERO {
-        return [*query; 2];
-    }
-    let centre = solution.elements.nodes[query.element as usize].centre;
-    let aside = |part: f64| SampleQuery { position: query.position.lerp(centre, part), inward: DVec3::ZERO, ..*query };
-    [aside(ASIDE), aside(2.0 * ASIDE)]
 }
 
 fn total(coarse: &CoarseMesh, fine: &FineMesh, places: &[Option<Place>]) -> Vec<Rgb> {

@@ -19,7 +19,7 @@ use crate::geometry::Geometry;
 use crate::leaf_gather::{LeafGather, SeenNode, Source};
 use crate::light_tree::LightTree;
 use crate::polygon_tree::PolygonTree;
-use crate::ray_gather::{RayGather, rays_for};
+use crate::ray_gather::{RayGather, View, rays_for};
 use crate::shafts::Shafts;
 use crate::solid::Solids;
 use crate::solution::{Solution, Visibility};
@@ -194,7 +194,7 @@ impl<'a> Gather<'a> {
         match self.emitter_tree {
             Some(_) => {
                 let emitters = self.over_shafts(element, &mut Shafts::default());
-                LeafGather { prominent: self.over_reflectors(element).prominent, ..emitters }
+                LeafGather { view: self.over_reflectors(element).view, ..emitters }
             }
             None => self.over_sources(element, |_| true),
         }
@@ -207,14 +207,14 @@ impl<'a> Gather<'a> {
                 let elements = &self.solution.elements;
                 let polygon = elements.polygon_of(element).unwrap_or_default();
                 let plane = self.geometry.plane(polygon);
-                let prominent = |rays: &RayGather| rays.prominent(self.solution, element, &plane);
+                let view = |rays: &RayGather| rays.over(self.solution, element, &plane);
                 LeafGather {
                     gather: self,
                     polygon,
                     centre: elements.nodes[element as usize].centre,
                     sources: Vec::new(),
                     groups: Vec::new(),
-                    prominent: self.rays().map_or_else(Vec::new, prominent),
+                    view: self.rays().map(view).unwrap_or_default(),
                     blockers: Vec::new(),
                 }
             }
@@ -234,9 +234,10 @@ impl<'a> Gather<'a> {
         reflectance * solution.light[node as usize].deviation * form_factor
     }
 
-    /// What the light over reflectors at a point scatters by, root mean square, relative to it: nothing but where rays find it.
-    pub fn scatter(&self) -> f64 {
-        self.rays().map_or(0.0, RayGather::scatter)
+    /// What the light over reflectors at a point of an element scatters by, root mean square, relative to it: nothing but where
+    /// rays find it.
+    pub fn scatter(&self, element: NodeId) -> f64 {
+        self.rays().map_or(0.0, |rays| rays.scatter(self.solution, element))
     }
 
     /// Irradiance, luminance, W·m⁻², that one reflector may misplace at a point; nothing where that is not what decides.
@@ -307,7 +308,7 @@ impl<'a> Gather<'a> {
         blockers.dedup();
         let polygon = elements.polygon_of(element).unwrap_or_default();
         let centre = elements.nodes[element as usize].centre;
-        LeafGather { gather: self, polygon, centre, sources, groups: Vec::new(), prominent: Vec::new(), blockers }
+        LeafGather { gather: self, polygon, centre, sources, groups: Vec::new(), view: View::default(), blockers }
     }
 
     /// A source polygon by all links from it.

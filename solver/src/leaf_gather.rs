@@ -19,6 +19,7 @@ use crate::blocker::Blocker;
 use crate::clip::clip_convex;
 use crate::emitter::outline_of;
 use crate::form_factor::{form_factor_at, point_form_factor};
+use crate::ray_gather::View;
 use crate::{Gather, NodeId};
 
 /// The part of a source's form factor from which on nothing is taken to hide it: above the rounding of its clipping.
@@ -49,8 +50,8 @@ pub struct LeafGather<'a> {
     pub(crate) sources: Vec<Source>,
     /// Groups of emitters that are faint here, in a scene without links.
     pub(crate) groups: Vec<u32>,
-    /// Patches of reflectors that are looked at one by one, by their roots, in a scene without links.
-    pub(crate) prominent: Vec<NodeId>,
+    /// How its points look at reflectors, in a scene without links.
+    pub(crate) view: View,
     /// All blockers of all sources, ascending.
     pub(crate) blockers: Vec<u32>,
 }
@@ -144,7 +145,7 @@ impl LeafGather<'_> {
                 self.look(position, inward, Light::Reflected, seen);
             }
             Some(rays) => {
-                rays.seen_nodes(self.gather.solution, &self.prominent, self.polygon, position, inward, seen);
+                rays.seen_nodes(self.gather.solution, &self.view, position, inward, seen);
             }
         }
     }

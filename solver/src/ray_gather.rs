@@ -28,9 +28,9 @@ const SCATTER: f64 = 0.6;
 const LEAST_RAYS: f64 = 64.0;
 const MOST_RAYS: f64 = 4096.0;
 
-/// A polygon with less area than the square of this fraction of the scene's size has this part of the rays: there are many, and
-/// what each is off by is lost among them.
-const SMALL_POLYGON: f64 = 0.01;
+/// Area of elements, as a part of that of all surfaces, from which on their points have all rays; those of smaller ones have fewer,
+/// as the root of the area is less, down to `FEW_RAYS`: there are many, and what each is off by is lost among them.
+const AMPLE: f64 = 1.0 / 6000.0;
 const FEW_RAYS: f64 = 0.25;
 
 /// How far from a contact a point is taken to be, along its direction of approach, as a fraction of the scene's size: above
@@ -44,9 +44,22 @@ const NEGLIGIBLE: f64 = 2.0;
 /// it of those over the hemisphere.
 const AIMED_RAYS: [u32; 2] = [1, 2];
 
-/// Where rays start: a position just in front of all that touches it, on a polygon.
-struct Origin {
+/// How the points of one element look at reflectors.
+#[derive(Default)]
+pub(crate) struct View {
+    /// The element's polygon.
     polygon: u32,
+    /// Rays over the hemisphere from each point.
+    rays: u32,
+    /// Root nodes of the patches that are looked at one by one, ascending, unless they send next to nothing to the point.
+    prominent: Vec<NodeId>,
+    /// What a patch sends at least to be looked at, luminance, W·m⁻².
+    negligible: f64,
+}
+
+/// Where rays start: a position just in front of all that touches it.
+struct Origin<'a> {
+    view: &'a View,
     position: DVec3,
     normal: DVec3,
     /// Of the lattices that rays from here are spread by.
@@ -66,9 +79,9 @@ pub(crate) struct RayGather {
     /// By polygon, luminance of its reflectance.
     reflectances: Vec<f64>,
     size: f64,
-    /// By polygon, rays from each of its points; the most of them; and which of all possible ones.
-    rays: Vec<u32>,
-    most: u32,
+    /// Rays from a point of an element that is large enough; which area that is, m²; and which of all possible rays.
+    rays: u32,
+    ample: f64,
     turn: u32,
     /// Irradiance, luminance, W·m⁻², that may be misplaced on account of nodes that stand for the leaves that rays meet.
     budget: f64,
@@ -87,9 +100,6 @@ impl RayGather {
                 patches.push(id);
             }
         }
-        let small = (SMALL_POLYGON * scene.size()).powi(2);
-        let is_small = |polygon: u32| scene.area(polygon) < small;
-        let few = ((f64::from(rays) * FEW_RAYS) as u32).max(1);
         let light = |patch: &Patch| {
             let root = patch.root;
             let radiosity = luminance(scene.reflectance(patch.polygon) * solution.light[root as usize].irradiance);
@@ -107,49 +117,57 @@ impl RayGather {
             normals: scene.polygon_ids().map(|polygon| scene.plane(polygon).normal).collect(),
             reflectances: scene.polygon_ids().map(|polygon| luminance(scene.reflectance(polygon))).collect(),
             size: scene.size(),
-            rays: scene.polygon_ids().map(|polygon| if is_small(polygon) { few } else { rays }).collect(),
-            most: rays,
+            rays,
+            ample: AMPLE * scene.polygon_ids().map(|polygon| scene.area(polygon)).sum::<f64>(),
             turn,
             budget,
         }
     }
 
-    /// Root nodes of the patches that may send more than next to nothing to a point of an element.
-    pub fn prominent(&self, solution: &Solution, element: NodeId, plane: &Plane) -> Vec<NodeId> {
-        let cut = self.tree.cut(solution.elements.outline(element), plane, NEGLIGIBLE * self.budget);
-        cut.single.iter().map(|&number| self.roots[number as usize]).collect()
+    /// How the points of an element, which lies in a plane, look at reflectors.
+    pub fn over(&self, solution: &Solution, element: NodeId, plane: &Plane) -> View {
+        let elements = &solution.elements;
+        let rays = self.rays_over(solution, element);
+        // What is not looked at is met by rays, which scatter the more the fewer they are.
+        let negligible = NEGLIGIBLE * self.budget * scatter_of(rays) / scatter_of(self.rays);
+        let cut = self.tree.cut(elements.outline(element), plane, negligible);
+        let prominent = cut.single.iter().map(|&number| self.roots[number as usize]).collect();
+        View { polygon: elements.polygon_of(element).unwrap_or_default(), rays, prominent, negligible }
     }
 
-    /// Appends the nodes of reflectors that a position of a polygon sees; ascending, each once. `inward` is the
-    /// direction in the plane that a position is approached from where other polygons touch it; zero elsewhere. `prominent` are
-    /// patches that are to be looked at one by one.
+    fn rays_over(&self, solution: &Solution, element: NodeId) -> u32 {
+        let part = (solution.elements.nodes[element as usize].area / self.ample).sqrt();
+        ((f64::from(self.rays) * part.clamp(FEW_RAYS, 1.0)) as u32).max(1)
+    }
+
+    /// Appends the nodes of reflectors that a position sees; ascending, each once. `inward` is the
+    /// direction in the plane that a position is approached from where other polygons touch it; zero elsewhere.
     pub fn seen_nodes(
         &self,
         solution: &Solution,
-        prominent: &[NodeId],
-        polygon: u32,
+        view: &View,
         position: DVec3,
         inward: DVec3,
         seen: &mut Vec<SeenNode>,
     ) {
         let from = Origin {
-            polygon,
+            view,
             position: position + inward * (ASIDE * self.size),
-            normal: self.normals[polygon as usize],
+            normal: self.normals[view.polygon as usize],
             shift: shift(position, self.turn),
         };
         let first = seen.len();
         let looked_at: Vec<NodeId> =
-            prominent.iter().copied().filter(|&root| self.look_at(solution, root, &from, seen)).collect();
+            view.prominent.iter().copied().filter(|&root| self.look_at(solution, root, &from, seen)).collect();
         self.look_around(solution, &from, &looked_at, seen);
         merge(seen, first);
     }
 
     /// Looks at one patch, unless it sends next to nothing to the point. Returns whether it was looked at.
-    fn look_at(&self, solution: &Solution, root: NodeId, from: &Origin, seen: &mut Vec<SeenNode>) -> bool {
+    fn look_at(&self, solution: &Solution, root: NodeId, from: &Origin<'_>, seen: &mut Vec<SeenNode>) -> bool {
         let elements = &solution.elements;
         let polygon = elements.polygon_of(root).unwrap_or_default();
-        if self.is_own(from.polygon, polygon) {
+        if self.is_own(from.view.polygon, polygon) {
             return false;
         }
         let outline = elements.outline(root);
@@ -158,7 +176,7 @@ impl RayGather {
         }
         let form_factor = form_factor_at(from.position, from.normal, outline);
         let radiosity = self.reflectances[polygon as usize] * luminance(solution.light[root as usize].irradiance);
-        if form_factor * radiosity <= NEGLIGIBLE * self.budget {
+        if form_factor * radiosity <= from.view.negligible {
             return false;
         }
         self.open(solution, root, form_factor, from, seen);
@@ -166,7 +184,7 @@ impl RayGather {
     }
 
     /// Adds what is seen of a node of a patch that is looked at; of its parts where the node's plane is not good enough.
-    fn open(&self, solution: &Solution, node: NodeId, form_factor: f64, from: &Origin, seen: &mut Vec<SeenNode>) {
+    fn open(&self, solution: &Solution, node: NodeId, form_factor: f64, from: &Origin<'_>, seen: &mut Vec<SeenNode>) {
         if form_factor <= 0.0 {
             return;
         }
@@ -185,12 +203,11 @@ impl RayGather {
         let Some(patch) = elements.patch_of(node) else { return };
         let outline = elements.outline(node);
         let is_bright = self.reflectances[polygon as usize] * luminance(light.irradiance) * form_factor > self.budget;
-        let rays =
-            AIMED_RAYS[usize::from(is_bright)].max((form_factor * f64::from(self.rays[from.polygon as usize])) as u32);
+        let rays = AIMED_RAYS[usize::from(is_bright)].max((form_factor * f64::from(from.view.rays)) as u32);
         let is_blocked = |place: DVec3| {
             let hides = |triangle: u32| {
                 let met = elements.patches[self.patches[triangle as usize] as usize].polygon;
-                !self.is_own(from.polygon, met) && !self.is_own(polygon, met)
+                !self.is_own(from.view.polygon, met) && !self.is_own(polygon, met)
             };
             self.bvh.is_blocked_among(from.position, place, hides)
         };
@@ -204,14 +221,14 @@ impl RayGather {
     }
 
     /// Adds what rays over the hemisphere meet of patches that are not looked at.
-    fn look_around(&self, solution: &Solution, from: &Origin, looked_at: &[NodeId], seen: &mut Vec<SeenNode>) {
+    fn look_around(&self, solution: &Solution, from: &Origin<'_>, looked_at: &[NodeId], seen: &mut Vec<SeenNode>) {
         let elements = &solution.elements;
-        let rays = self.rays[from.polygon as usize];
+        let rays = from.view.rays;
         let share = 1.0 / f64::from(rays);
         for direction in hemisphere(from.normal, rays, from.shift) {
             let meets = |triangle: u32| {
                 let met = elements.patches[self.patches[triangle as usize] as usize].polygon;
-                !self.is_own(from.polygon, met)
+                !self.is_own(from.view.polygon, met)
                     && (self.other_sides[met as usize].is_none() || self.normals[met as usize].dot(direction) < 0.0)
             };
             let ray = Ray { origin: from.position, direction };
@@ -239,12 +256,12 @@ impl RayGather {
     /// for all leaves that it sees: by each ray something else.
     pub fn misplaced(&self, solution: &Solution, node: NodeId) -> f64 {
         let polygon = solution.elements.polygon_of(node).unwrap_or_default();
-        self.reflectances[polygon as usize] * solution.light[node as usize].deviation / f64::from(self.most).sqrt()
+        self.reflectances[polygon as usize] * solution.light[node as usize].deviation / f64::from(self.rays).sqrt()
     }
 
-    /// What rays are taken to be off by at a point, root mean square, relative to the light over reflectors there.
-    pub fn scatter(&self) -> f64 {
-        SCATTER * f64::from(self.most).powf(-0.75)
+    /// What rays are taken to be off by at a point of an element, root mean square, relative to the light over reflectors there.
+    pub fn scatter(&self, solution: &Solution, element: NodeId) -> f64 {
+        scatter_of(self.rays_over(solution, element))
     }
 
     /// The largest node of a patch around a place that is good enough.
@@ -268,6 +285,10 @@ impl RayGather {
 /// Rays from a point for a source error.
 pub(crate) fn rays_for(source_error: f64) -> u32 {
     (RAYS * (RAYS_ERROR / source_error).powf(4.0 / 3.0)).clamp(LEAST_RAYS, MOST_RAYS) as u32
+}
+
+fn scatter_of(rays: u32) -> f64 {
+    SCATTER * f64::from(rays).powf(-0.75)
 }
 
 /// Makes one of all that is seen of each node from `first` on.
@@ -322,13 +343,13 @@ mod tests {
         let solution = solve(&room, &SolveOptions { link_error: Some(0.1), bounces: None }, &|_| ());
         let gather = RayGather::new(&room, &solution, 256, 1e-3, 0);
         let floor = solution.patch_roots(4).next().expect("the floor is a patch");
-        let prominent = gather.prominent(&solution, floor, &room.plane(4));
-        assert!(prominent.len() > 5);
+        let view = gather.over(&solution, floor, &room.plane(4));
+        assert!(view.prominent.len() > 5);
         let mut sums = Vec::new();
         for i in 0..40 {
             let position = DVec3::new(0.1 + 0.094 * f64::from(i), 0.2 + f64::from(i * 7 % 40) * 0.065, 0.0);
             let mut seen = Vec::new();
-            gather.seen_nodes(&solution, &prominent, 4, position, DVec3::ZERO, &mut seen);
+            gather.seen_nodes(&solution, &view, position, DVec3::ZERO, &mut seen);
             let sum: f64 = seen.iter().map(|seen| seen.form_factor).sum();
             sums.push(sum - 1.0);
         }

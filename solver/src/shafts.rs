@@ -11,6 +11,7 @@ use crate::emitter::{Emitter, outline_of};
 use crate::form_factor::form_factor_at;
 use crate::leaf_gather::{LeafGather, Source};
 use crate::polygon_tree::Stands;
+use crate::ray_gather::View;
 use crate::visibility::{Shaft, facing_parts};
 use crate::{Gather, NodeId};
 
@@ -90,7 +91,7 @@ impl<'a> Gather<'a> {
             sources.iter().filter_map(|source| source.blockers.as_ref()).flatten().copied().collect();
         blockers.sort_unstable();
         blockers.dedup();
-        LeafGather { gather: self, polygon, centre, sources, groups: cut.groups, prominent: Vec::new(), blockers }
+        LeafGather { gather: self, polygon, centre, sources, groups: cut.groups, view: View::default(), blockers }
     }
 
     /// What stands in the shaft between an emitter and an element.

@@ -1,0 +1,171 @@
+//! Stand-ins: where light over reflectors is looked at in place of the samples of a mesh, and how much of each look a sample is.
+
+use glam::{DVec2, DVec3};
+use scene::{Rgb, Scene};
+use solver::{Patch, Solution, Visibility};
+
+use crate::{Leaf, Mesh, SampleQuery, SampleTable};
+
+/// Area of leaves, as a part of that of all surfaces, below which light is looked at within the leaf and taken for linear, until
+/// a probe says otherwise: in a scene whose light is found by rays. More leaves what curves to probes, less looks at all
+/// corners of leaves that nobody will tell from their neighbours.
+const SMALL_LEAF: f64 = 1.0 / 12_000.0;
+
+/// Width of leaves, as a part of their length, below which light is taken for the same all across them.
+const NARROW: f64 = 0.25;
+
+/// How far from a contact its stand-ins lie, as parts of the way to the middle of the element. Nearer ones feel more of what
+/// is special to the contact, farther ones miss more of what curves.
+const ASIDE: f64 = 0.07;
+
+/// What is looked at for the samples of a mesh.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct StandIns {
+    /// Where light is looked at. Those of one element stand together.
+    pub queries: Vec<SampleQuery>,
+    /// By sample the first of its shares, and their number at the end.
+    first: Vec<usize>,
+    /// Number of a query, and how many times its light counts.
+    shares: Vec<(u32, f64)>,
+}
+
+/// Light over a small leaf as a plane: through what it is at two places or four, about the middle along the leaf's principal
+/// axes. The two along an axis are those of Gauss' rule of two points over a rectangle, and lie within any convex outline.
+struct LeafPlane {
+    /// The first of its queries; those of an axis follow each other.
+    first: u32,
+    centre: DVec3,
+    /// One axis, or two: from the middle to the first place.
+    axes: Vec<DVec3>,
+}
+
+impl StandIns {
+    /// Where to look for the samples of a mesh of leaves.
+    pub fn new(scene: &Scene, solution: &Solution, leaves: &[Leaf], mesh: &Mesh, table: &SampleTable) -> Self {
+        let small = match solution.visibility {
+            Visibility::Rays => SMALL_LEAF * scene.polygon_ids().map(|polygon| scene.area(polygon)).sum::<f64>(),
+            Visibility::Links => 0.0,
+        };
+        let mut stand_ins = Self::default();
+        let planes: Vec<Option<LeafPlane>> = leaves
+            .iter()
+            .map(|leaf| {
+                let is_small = solution.elements.nodes[leaf.element as usize].area < small;
+                is_small.then(|| stand_ins.look_within(solution, leaf)).flatten()
+            })
+            .collect();
+        for (query, leaves) in table.queries.iter().zip(leaves_of_samples(mesh, table)) {
+            stand_ins.first.push(stand_ins.shares.len());
+            let around: Option<Vec<&LeafPlane>> = leaves.iter().map(|&leaf| planes[leaf as usize].as_ref()).collect();
+            match around {
+                Some(around) => {
+                    let part = 1.0 / around.len() as f64;
+                    around.into_iter().for_each(|plane| plane.share(query.position, part, &mut stand_ins.shares));
+                }
+                None => stand_ins.look_at(solution, query),
+            }
+        }
+        stand_ins.first.push(stand_ins.shares.len());
+        stand_ins
+    }
+
+    /// The samples' light, from that at the queries; never negative.
+    pub fn of_samples(&self, looked: &[Rgb]) -> Vec<Rgb> {
+        let sample = |range: &[usize]| {
+            let shares = self.shares[range[0]..range[1]].iter();
+            shares.map(|&(query, part)| looked[query as usize] * part).sum::<Rgb>().max(Rgb::ZERO)
+        };
+        self.first.windows(2).map(sample).collect()
+    }
+
+    /// Looks at a sample: at its own place, or at a contact at two places aside.
+    ///
+    /// At a contact the slope of the light over reflectors is infinite (it goes with d ln d at the distance d), and an
+    /// interpolant through the limit is off over all of the leaf. One through what the light is a little aside, continued in a
+    /// straight line, is off in a strip.
+    fn look_at(&mut self, solution: &Solution, query: &SampleQuery) {
+        let number = self.queries.len() as u32;
+        if query.inward == DVec3::ZERO {
+            self.queries.push(*query);
+            self.shares.push((number, 1.0));
+            return;
+        }
+        let centre = solution.elements.nodes[query.element as usize].centre;
+        let aside =
+            |part: f64| SampleQuery { position: query.position.lerp(centre, part), inward: DVec3::ZERO, ..*query };
+        self.queries.extend([aside(ASIDE), aside(2.0 * ASIDE)]);
+        self.shares.extend([(number, 2.0), (number + 1, -1.0)]);
+    }
+
+    /// Looks at places within a leaf. None if it has no extent.
+    fn look_within(&mut self, solution: &Solution, leaf: &Leaf) -> Option<LeafPlane> {
+        let patch = solution.elements.patch_of(leaf.element)?;
+        let (centre, axes) = principal_axes(&leaf.outline, &solution.elements.patches[patch as usize])?;
+        let first = self.queries.len() as u32;
+        let Leaf { polygon, element, .. } = *leaf;
+        let query = |position| SampleQuery { position, polygon, element, inward: DVec3::ZERO };
+        self.queries.extend(axes.iter().flat_map(|&axis| [query(centre + axis), query(centre - axis)]));
+        Some(LeafPlane { first, centre, axes })
+    }
+}
+
+impl LeafPlane {
+    /// Adds what the plane is at a position, times `part`.
+    fn share(&self, position: DVec3, part: f64, shares: &mut Vec<(u32, f64)>) {
+        let even = part / (2 * self.axes.len()) as f64;
+        for (query, axis) in (self.first..).step_by(2).zip(&self.axes) {
+            let slope = part * axis.dot(position - self.centre) / (2.0 * axis.length_squared());
+            shares.extend([(query, even + slope), (query + 1, even - slope)]);
+        }
+    }
+}
+
+/// By sample, the leaves whose triangles use it, ascending.
+fn leaves_of_samples(mesh: &Mesh, table: &SampleTable) -> Vec<Vec<u32>> {
+    let mut leaves: Vec<Vec<u32>> = vec![Vec::new(); table.queries.len()];
+    for (triangle, samples) in mesh.triangles.iter().zip(&table.triangles) {
+        for &sample in samples {
+            let leaves = &mut leaves[sample as usize];
+            if leaves.last() != Some(&triangle.leaf) {
+                leaves.push(triangle.leaf);
+            }
+        }
+    }
+    leaves
+}
+
+/// The middle of a convex outline in a patch's plane, and its principal axes, as long as the root mean square of what lies
+/// along them; the longer one alone if it is narrow. None without an area.
+fn principal_axes(outline: &[DVec3], patch: &Patch) -> Option<(DVec3, Vec<DVec3>)> {
+    let corners: Vec<DVec2> = outline.iter().map(|&corner| patch.along(corner - outline[0])).collect();
+    let (mut area, mut first, mut second) = (0.0, DVec2::ZERO, [0.0; 3]);
+    for edge in corners.get(1..)?.windows(2) {
+        let (a, b) = (edge[0], edge[1]);
+        let part = a.perp_dot(b) / 2.0;
+        let sum = a + b;
+        area += part;
+        first += sum * (part / 3.0);
+        let moment = |a: f64, b: f64, c: f64, d: f64, s: f64, t: f64| (a * b + c * d + s * t) * part / 12.0;
+        second[0] += moment(a.x, a.x, b.x, b.x, sum.x, sum.x);
+        second[1] += moment(a.x, a.y, b.x, b.y, sum.x, sum.y);
+        second[2] += moment(a.y, a.y, b.y, b.y, sum.y, sum.y);
+    }
+    let middle = first / area;
+    let [xx, xy, yy] = [
+        second[0] / area - middle.x * middle.x,
+        second[1] / area - middle.x * middle.y,
+        second[2] / area - middle.y * middle.y,
+    ];
+    let (mean, half) = ((xx + yy) / 2.0, ((xx - yy) / 2.0).hypot(xy));
+    let way = DVec2::from_angle(xy.atan2((xx - yy) / 2.0) / 2.0);
+    let [long, short] = [mean + half, mean - half].map(|square| square.max(0.0).sqrt());
+    if !(long.is_finite() && long > 0.0) {
+        return None;
+    }
+    let in_space = |way: DVec2| patch.u * way.x + patch.v * way.y;
+    let mut axes = vec![in_space(way) * long];
+    if short > NARROW * long {
+        axes.push(in_space(way.perp()) * short);
+    }
+    Some((outline[0] + in_space(middle), axes))
+}
