@@ -90,17 +90,24 @@ impl FineMesh {
         (0..self.triangles())
             .map(|triangle| {
                 let samples = self.table.triangles[triangle].map(|sample| self.emitted[sample as usize]);
-                let (s, t) = probe_point(triangle);
+                let (s, t) = probe_point(self.probe_number(triangle));
                 let difference = scene::Interpolant::through(samples).evaluate(s, t) - self.probed[triangle];
                 (colour_mean(difference * difference).sqrt(), colour_mean(self.probed[triangle]))
             })
             .collect()
     }
 
+    /// Which point of a triangle is its probe: the same as long as its leaf stays as it is.
+    fn probe_number(&self, triangle: usize) -> u32 {
+        let leaf = self.mesh.triangles[triangle].leaf;
+        let first = self.mesh.triangles.partition_point(|other| other.leaf < leaf);
+        self.leaves[leaf as usize].element + (triangle - first) as u32
+    }
+
     fn probe_query(&self, triangle: usize) -> SampleQuery {
         let [a, b, c] = self.corners(triangle);
         let Leaf { polygon, element, .. } = self.leaves[self.mesh.triangles[triangle].leaf as usize];
-        let (s, t) = probe_point(triangle);
+        let (s, t) = probe_point(self.probe_number(triangle));
         let position = a * (1.0 - s - t) + b * s + c * t;
         SampleQuery { position, polygon, element, inward: DVec3::ZERO }
     }

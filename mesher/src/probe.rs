@@ -1,6 +1,6 @@
 //! Probes: points of triangles that no interpolant was fitted to, and what an error there counts.
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 use scene::Rgb;
 
 /// Barycentrics of the probe point of a triangle, which turns from triangle to triangle. A cubic that vanishes at all
@@ -10,8 +10,9 @@ use scene::Rgb;
 const PROBE: [f64; 3] = [0.6, 0.3, 0.1];
 
 /// Barycentrics (s, t) of a triangle's probe point.
-pub(crate) fn probe_point(triangle: usize) -> (f64, f64) {
-    (PROBE[(triangle + 1) % 3], PROBE[(triangle + 2) % 3])
+pub(crate) fn probe_point(number: u32) -> (f64, f64) {
+    let DVec2 { x: s, y: t } = solver::spread(DVec2::ZERO, number);
+    if s + t > 1.0 { (1.0 - s, 1.0 - t) } else { (s, t) }
 }
 
 /// Average over the colours.

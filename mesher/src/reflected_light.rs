@@ -14,11 +14,11 @@ use std::collections::HashMap;
 use glam::{DVec2, DVec3, Vec3};
 use rayon::prelude::*;
 use scene::{Interpolant, Rgb, Scene, Seen};
-use solver::{ElementLight, Gather, NodeId, SeenNode, Solution, Visibility};
+use solver::{ElementLight, Fan, Gather, NodeId, SeenNode, Solution, Visibility};
 
 use crate::fine_mesh::FineMesh;
 use crate::inquiry::Inquiry;
-use crate::probe::{at, colour_mean, probe_point};
+use crate::probe::colour_mean;
 use crate::projection::Projection;
 use crate::samples::QueryKey;
 use crate::stand_ins::StandIns;
@@ -433,8 +433,13 @@ impl CoarseMesh {
 fn probe(solution: &Solution, element: NodeId) -> SampleQuery {
     let elements = &solution.elements;
     let outline = elements.outline(element);
-    let corner = |i: usize| outline[(element as usize + i) % outline.len()];
-    let position = at([elements.nodes[element as usize].centre, corner(0), corner(1)], probe_point(0));
+    let position = match solution.visibility {
+        Visibility::Links => {
+            let corner = |i: usize| outline[(element as usize + i) % outline.len()];
+            elements.nodes[element as usize].centre * 0.6 + corner(0) * 0.3 + corner(1) * 0.1
+        }
+        Visibility::Rays => Fan::new(outline).place(DVec2::ZERO, element),
+    };
     let polygon = elements.polygon_of(element).unwrap_or_default();
     SampleQuery { position, polygon, element, inward: DVec3::ZERO }
 }

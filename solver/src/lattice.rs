@@ -8,7 +8,7 @@ use glam::{DVec2, DVec3};
 pub(crate) const STEP: DVec2 = DVec2::new(0.754_877_666_246_692_8, 0.569_840_290_998_053_3);
 
 /// A convex outline as a fan of triangles, over which places are spread evenly by area.
-pub(crate) struct Fan<'a> {
+pub struct Fan<'a> {
     outline: &'a [DVec3],
     normal: DVec3,
     /// Twice the area of each triangle, and of all.
@@ -18,7 +18,7 @@ pub(crate) struct Fan<'a> {
 
 /// What arrives of what an outline sends to a position.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Arriving {
+pub struct Arriving {
     /// The part that arrives, 0..=1.
     pub share: f64,
     /// Mean place that it comes from, each weighted by what it sends; nowhere in particular if nothing arrives.
@@ -36,7 +36,7 @@ impl<'a> Fan<'a> {
 
     /// The place number `i` of the lattice.
     pub fn place(&self, shift: DVec2, i: u32) -> DVec3 {
-        let DVec2 { x: u, y: v } = (shift + STEP * f64::from(i)).fract();
+        let DVec2 { x: u, y: v } = spread(shift, i);
         let mut left = u * self.total;
         let triangle = self.areas.iter().position(|&area| {
             left -= area;
@@ -75,12 +75,17 @@ impl<'a> Fan<'a> {
     }
 }
 
+/// The point number `i` of the lattice in the unit square.
+pub fn spread(shift: DVec2, i: u32) -> DVec2 {
+    (shift + STEP * f64::from(i)).fract()
+}
+
 /// Directions about a normal with a density of the cosine over π.
 pub fn hemisphere(normal: DVec3, count: u32, shift: DVec2) -> impl Iterator<Item = DVec3> {
     let (x, y) = normal.any_orthonormal_pair();
     (0..count).map(move |i| {
-        let u = (shift.x + f64::from(i) * STEP.x).fract();
-        let (sin, cos) = (TAU * (shift.y + f64::from(i) * STEP.y).fract()).sin_cos();
+        let DVec2 { x: u, y: v } = spread(shift, i);
+        let (sin, cos) = (TAU * v).sin_cos();
         (x * cos + y * sin) * u.sqrt() + normal * (1.0 - u).sqrt()
     })
 }
