@@ -8,7 +8,7 @@ use std::collections::{BTreeMap, HashSet};
 use std::path::Path;
 
 use glam::{DVec3, Vec3};
-use scene::{Polygon, Scene};
+use scene::{Polygon, Scene, Welder};
 
 use crate::FormatError;
 use crate::camera::default_camera;
@@ -21,7 +21,6 @@ use crate::obj::read_obj;
 use crate::repair::{add_other_sides, close_junctions, orient, warn_of_winding};
 use crate::report::{ImportReport, counted};
 use crate::scene_file::read_scene_file;
-use crate::weld::weld;
 
 /// Distance within which positions are one vertex, as a fraction of the scene's size: a few roundings of f32, in
 /// which most modellers keep coordinates. Wider would close gaps that were meant.
@@ -108,7 +107,9 @@ fn repair(path: &Path, mut model: Model, sides: Sides, report: &mut ImportReport
     model.separate_untextured();
     model.split_where_not_affine();
     let tolerance = WELD_DISTANCE * size(&model.positions);
-    let (vertices, stands_for) = weld(&model.positions, tolerance);
+    let mut welder = Welder::new(tolerance);
+    let stands_for: Vec<u32> = model.positions.iter().map(|&position| welder.vertex(position)).collect();
+    let vertices = welder.into_vertices();
     report.welded_vertices = model.positions.len() - vertices.len();
 
     let mut faces = std::mem::take(&mut model.faces);

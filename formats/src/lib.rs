@@ -28,7 +28,6 @@ mod report;
 mod scene_file;
 mod texture_file;
 mod unfinished;
-mod weld;
 
 pub use atomic_file::write_atomically;
 pub use baked_file::{is_baked, read_baked, read_unfinished, write_baked, write_unfinished};

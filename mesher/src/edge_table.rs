@@ -12,12 +12,11 @@ use std::collections::HashMap;
 
 use glam::DVec3;
 use rayon::prelude::*;
-use scene::{Bvh, EdgeKind, Scene};
+use scene::{Bvh, EdgeKind, Scene, Welder};
 use solver::Cut;
 
 use crate::arrangement::{self, Arrangement, Segment, arrange};
 use crate::frame::Frame;
-use crate::weld::Welder;
 
 /// Points nearer than this fraction of the scene's size (or of its largest coordinate, if that is larger) are one
 /// vertex. It is about what the f32 positions that are stored can tell apart. Larger would close wider cracks between

@@ -29,7 +29,6 @@ mod stand_ins;
 #[cfg(test)]
 mod testing;
 mod weight;
-mod weld;
 
 pub use bake::{Bake, BakeOptions, BakeStatistics, Control, bake, resume};
 pub use critical_surface::GrazingRay;

@@ -18,6 +18,7 @@ mod scene;
 mod texture;
 mod texture_map;
 mod unfinished;
+mod weld;
 
 pub use baked::{Baked, BakedElement, BakedError, BakedTriangle, DiscontinuityLine, EdgeKind, LineKind, Provenance};
 pub use bvh::{Bvh, Hit};
@@ -33,3 +34,4 @@ pub use scene::{LARGEST_COORDINATE, Scene, SceneError, other_sides};
 pub use texture::Texture;
 pub use texture_map::TextureMap;
 pub use unfinished::{Answers, Seen, Unfinished};
+pub use weld::Welder;

@@ -7,15 +7,20 @@
 
 use glam::DVec3;
 use rayon::prelude::*;
-use scene::{Plane, Scene, area_vector};
+use scene::{Plane, Scene, Welder, area_vector};
 
 use crate::Cut;
 use crate::clip::clip_convex;
 use crate::contour::edges;
 use crate::geometry::Geometry;
+use crate::polygon_tree::PolygonTree;
 
 /// Distance below which a point lies on a line or a corner while a polygon is cut, as a fraction of its diameter.
 const COINCIDENT: f64 = 1e-9;
+
+/// Distance of the points next to a corner of the polygon within which lines may be one, as a fraction of its diameter. Less
+/// takes short cuts along one line, whose ends say less of it, for cuts along two; more compares more lines.
+const SAME_FOOT: f64 = 1e-6;
 
 /// Smallest piece cut off, as a fraction of the polygon's squared diameter: what is smaller is rounding.
 const SMALLEST_PIECE: f64 = 1e-12;
@@ -31,50 +36,9 @@ const MOST_CANDIDATES: usize = 32;
 /// the receiver's own border have nothing to cut and are left out, like contacts from behind, which change no light.
 pub fn contact_lines(scene: &Scene) -> Vec<Vec<Cut>> {
     let geometry = Geometry::new(scene);
-    let partners = overlapping_boxes(&geometry.outlines, geometry.contact_tolerance);
-    scene.polygon_ids().into_par_iter().map(|id| lines_on(&geometry, id, &partners[id as usize])).collect()
-}
-
-/// For every outline the others whose bounding boxes, padded by `tolerance`, overlap its own, ascending.
-fn overlapping_boxes(outlines: &[Vec<DVec3>], tolerance: f64) -> Vec<Vec<u32>> {
-    let boxes: Vec<_> = outlines
-        .iter()
-        .map(|outline| {
-            let low = outline.iter().copied().fold(DVec3::INFINITY, DVec3::min);
-            let high = outline.iter().copied().fold(DVec3::NEG_INFINITY, DVec3::max);
-            (low, high + tolerance)
-        })
-        .collect();
-    // Sweep along the axis in which the polygons are spread widest.
-    let spread =
-        boxes.iter().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), b| (low.min(b.0), high.max(b.0)));
-    let axis = (spread.1 - spread.0).max_position();
-    let mut order: Vec<u32> = (0..outlines.len() as u32).collect();
-    order.sort_by(|&a, &b| boxes[a as usize].0[axis].total_cmp(&boxes[b as usize].0[axis]));
-    let pairs: Vec<(u32, u32)> = (0..order.len())
-        .into_par_iter()
-        .flat_map_iter(|i| {
-            let boxes = &boxes;
-            let (low, high) = boxes[order[i] as usize];
-            let within_reach =
-                order[i + 1..].iter().take_while(move |&&other| boxes[other as usize].0[axis] <= high[axis]);
-            let overlaps = move |other: &&u32| {
-                let (other_low, other_high) = boxes[**other as usize];
-                other_low.cmple(high).all() && low.cmple(other_high).all()
-            };
-            let this = order[i];
-            within_reach.filter(overlaps).map(move |&other| (this, other))
-        })
-        .collect();
-    let mut partners = vec![Vec::new(); outlines.len()];
-    for (a, b) in pairs {
-        partners[a as usize].push(b);
-        partners[b as usize].push(a);
-    }
-    for others in &mut partners {
-        others.sort_unstable();
-    }
-    partners
+    let tree = PolygonTree::new(scene);
+    let lines = |id| lines_on(&geometry, id, &tree.around(geometry.outline(id), geometry.contact_tolerance));
+    scene.polygon_ids().into_par_iter().map(lines).collect()
 }
 
 /// The lines that other polygons draw on one.
@@ -165,21 +129,16 @@ pub fn cut_polygon(outline: &[DVec3], cuts: &[Cut]) -> Vec<Vec<DVec3>> {
         return vec![outline.to_vec()];
     }
     let knife = Knife { normal, tolerance: COINCIDENT * diameter, smallest: SMALLEST_PIECE * diameter * diameter };
-    let mut lines: Vec<Line> = Vec::new();
+    let mut lines = Lines::new(outline[0], knife.tolerance, diameter);
     let mut segments = Vec::new();
     for cut in cuts {
         let Some(ends) = clip_segment(outline, normal, cut.ends, knife.tolerance) else { continue };
         // Cuts along one line, of the two sides of a wall or of adjoining walls, share its first description.
-        let known = lines.iter().position(|line| ends.iter().all(|&end| line.distance(end).abs() <= knife.tolerance));
-        let line = known.unwrap_or(lines.len());
-        if known.is_none() {
-            let Some(across) = normal.cross(cut.ends[1] - cut.ends[0]).try_normalize() else { continue };
-            lines.push(Line { across, through: cut.ends[0] });
-        }
-        segments.push(Segment { line, ends });
+        let Some(across) = normal.cross(cut.ends[1] - cut.ends[0]).try_normalize() else { continue };
+        segments.push(Segment { line: lines.along(Line { across, through: cut.ends[0] }, ends), ends });
     }
     let mut pieces = Vec::new();
-    knife.partition(outline.to_vec(), segments, &lines, &mut pieces);
+    knife.partition(outline.to_vec(), segments, &lines.lines, &mut pieces);
     weld(outline, &mut pieces, knife.tolerance);
     pieces
 }
@@ -194,6 +153,35 @@ struct Line {
 impl Line {
     fn distance(&self, point: DVec3) -> f64 {
         self.across.dot(point - self.through)
+    }
+}
+
+/// The lines along which one polygon is cut, each described once.
+struct Lines {
+    lines: Vec<Line>,
+    /// By line, its point next to a corner of the polygon: lines that are one have it in common.
+    feet: Welder,
+    corner: DVec3,
+    tolerance: f64,
+}
+
+impl Lines {
+    fn new(corner: DVec3, tolerance: f64, diameter: f64) -> Self {
+        Self { lines: Vec::new(), feet: Welder::new(SAME_FOOT * diameter), corner, tolerance }
+    }
+
+    /// The first line that a segment lies on, which is `line` if none does yet.
+    fn along(&mut self, line: Line, ends: [DVec3; 2]) -> usize {
+        let foot = self.corner - line.across * line.distance(self.corner);
+        let is_on = |line: &Line| ends.iter().all(|&end| line.distance(end).abs() <= self.tolerance);
+        let known = self.feet.near(foot).filter(|&line| is_on(&self.lines[line as usize])).min();
+        known.map_or_else(
+            || {
+                self.lines.push(line);
+                self.feet.push(foot) as usize
+            },
+            |known| known as usize,
+        )
     }
 }
 
@@ -276,12 +264,13 @@ fn fatness(outline: &[DVec3]) -> f64 {
 
 /// Moves corners that are the same but for rounding on the first of them; the polygon's own come first.
 fn weld(outline: &[DVec3], pieces: &mut [Vec<DVec3>], tolerance: f64) {
-    let mut corners = outline.to_vec();
+    let mut corners = Welder::new(tolerance);
+    outline.iter().for_each(|&corner| {
+        corners.push(corner);
+    });
     for corner in pieces.iter_mut().flatten() {
-        match corners.iter().find(|known| known.distance_squared(*corner) <= tolerance * tolerance) {
-            Some(known) => *corner = *known,
-            None => corners.push(*corner),
-        }
+        let id = corners.vertex(*corner);
+        *corner = corners.vertices()[id as usize];
     }
     for piece in pieces {
         piece.dedup();

@@ -1,5 +1,7 @@
 //! Which polygons touch a point, stand in a shaft, or block a ray: a hierarchy over all of them, asked in place of each.
 
+use std::cell::Cell;
+
 use glam::DVec3;
 use scene::{Bvh, Scene, other_sides};
 
@@ -21,6 +23,9 @@ pub enum Stands {
 /// in any case.
 const MOST_CANDIDATES: usize = 160;
 
+/// Triangles of such polygons at most that are counted: two for each.
+const MOST_TRIANGLES: usize = 2 * MOST_CANDIDATES;
+
 /// A bounding volume hierarchy over the polygons of a scene.
 pub struct PolygonTree {
     bvh: Bvh,
@@ -39,10 +44,27 @@ impl PolygonTree {
         self.ascending(|low, high| (point + reach).cmpge(low).all() && (point - reach).cmple(high).all())
     }
 
+    /// Polygons whose boxes overlap that of an outline, padded by `reach` metres, ascending.
+    pub fn around(&self, outline: &[DVec3], reach: f64) -> Vec<u32> {
+        let lowest = outline.iter().copied().fold(DVec3::INFINITY, DVec3::min) - reach;
+        let highest = outline.iter().copied().fold(DVec3::NEG_INFINITY, DVec3::max) + reach;
+        self.ascending(|low, high| low.cmple(highest).all() && lowest.cmple(high).all())
+    }
+
     /// What stands in a shaft.
     pub fn in_shaft(&self, geometry: &Geometry, shaft: &Shaft<'_>) -> Stands {
-        let mut found = self.ascending(|low, high| shaft.may_enter(low, high));
-        if found.len() > MOST_CANDIDATES {
+        let mut found = Vec::new();
+        let entered = Cell::new(0);
+        self.bvh.within(
+            |low, high| entered.get() <= MOST_TRIANGLES && shaft.may_enter(low, high),
+            |polygon| {
+                found.push(polygon);
+                entered.set(found.len());
+            },
+        );
+        found.sort_unstable();
+        found.dedup();
+        if found.len() > MOST_CANDIDATES || entered.get() > MOST_TRIANGLES {
             return Stands::Many;
         }
         let mut is_total = false;
