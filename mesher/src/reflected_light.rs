@@ -57,9 +57,9 @@ struct CoarseMesh {
 pub(crate) struct LeafError {
     /// The element.
     pub element: NodeId,
-    /// Root mean square over the colours at one point that nothing was fitted to, W·m⁻².
+    /// Root mean square over the colours, at points that nothing was fitted to, W·m⁻².
     pub error: f64,
-    /// The exact light over reflectors there, averaged over the colours, W·m⁻².
+    /// The mean of the exact light over reflectors there, averaged over the colours, W·m⁻².
     pub irradiance: f64,
 }
 
@@ -137,7 +137,8 @@ impl ReflectedLight {
         let over_links = |solution: &Solution, element, position| {
             solution.reflected_over_links(element, offset(solution, element, position))
         };
-        let probes: Vec<SampleQuery> = self.front.iter().map(|&leaf| probe(solution, leaf)).collect();
+        let probes: Vec<SampleQuery> =
+            self.front.iter().flat_map(|&leaf| probes(solution, leaf, f64::INFINITY)).collect();
         let leaf_of = leaf_numbers(solution, &self.front);
         let mut correction = vec![Rgb::ZERO; self.front.len()];
         let light = |solution: &Solution, correction: &[Rgb]| -> Vec<Rgb> {
@@ -178,27 +179,31 @@ impl ReflectedLight {
         options: &Exchange,
         inquiry: &mut Inquiry<'_>,
     ) -> Option<Vec<LeafError>> {
-        let queries: Vec<SampleQuery> = self.front.iter().map(|&leaf| probe(solution, leaf)).collect();
+        let area: f64 = scene.polygon_ids().map(|polygon| scene.area(polygon)).sum();
+        let queries: Vec<SampleQuery> =
+            self.front.iter().flat_map(|&leaf| probes(solution, leaf, PROBED * area)).collect();
         self.look(scene, solution, &queries, options, STALE_PROBE, inquiry);
         if inquiry.stopped() {
             return None;
         }
         let rows: Vec<&Row> = queries.iter().map(|query| self.row(query, inquiry)).collect();
-        let exact = Radiosity::of(scene, solution).received(&rows);
+        let looked: Vec<(SampleQuery, Rgb)> =
+            queries.into_iter().zip(Radiosity::of(scene, solution).received(&rows)).collect();
         let gather = Gather::with_source_error(scene, solution, options.source_error);
-        // The probe scatters, and so do the samples about it: what they differ by for that no division mends.
-        let scatter = |element| 2.0 * (BEYOND_CHANCE * gather.scatter(element)).powi(2);
-        let error = |(leaf, (query, exact)): (usize, (&SampleQuery, Rgb))| {
-            let difference = self.coarse.place(leaf, query).map_or(Rgb::ZERO, |place| self.coarse.at(place)) - exact;
-            LeafError {
-                element: query.element,
-                error: (colour_mean(difference * difference) - scatter(query.element) * colour_mean(exact).powi(2))
-                    .max(0.0)
-                    .sqrt(),
-                irradiance: colour_mean(exact),
-            }
-        };
-        Some(queries.iter().zip(exact).enumerate().map(error).collect())
+        let errors = looked.chunk_by(|a, b| a.0.element == b.0.element).enumerate().map(|(leaf, probes)| {
+            let (element, count) = (probes[0].0.element, probes.len() as f64);
+            let irradiance = probes.iter().map(|(_, exact)| colour_mean(*exact)).sum::<f64>() / count;
+            let square = |(query, exact): &(SampleQuery, Rgb)| {
+                let baked = self.coarse.place(leaf, query).map_or(Rgb::ZERO, |place| self.coarse.at(place));
+                colour_mean((baked - exact) * (baked - exact))
+            };
+            let square = probes.iter().map(square).sum::<f64>() / count;
+            // A probe scatters, and so do the samples about it: what they differ by for that no division mends.
+            let chance = 2.0 * (1.0 + (BEYOND_CHANCE.powi(2) - 1.0) / count.sqrt());
+            let scatter = chance * (gather.scatter(element) * irradiance).powi(2);
+            LeafError { element, error: (square - scatter).max(0.0).sqrt(), irradiance }
+        });
+        Some(errors.collect())
     }
 
     /// Number of points at which reflectors were looked at.
@@ -299,6 +304,11 @@ pub(crate) struct Exchange {
 /// What a row may misplace before it is looked at anew, in what one reflector may misplace at a point: a row names a hundred
 /// nodes. Less finds most rows wanting after every division.
 const STALE: f64 = 3.0;
+
+/// Area of a leaf for which it is probed once, as a part of that of all surfaces, and probes of a leaf at most. More probes miss
+/// less of what lies in large leaves, which make up most of the error where they are wrong.
+const PROBED: f64 = 1.0 / 6000.0;
+const MOST_PROBES: f64 = 4.0;
 
 /// Standard deviations of what rays scatter by beyond which a difference is an error. Less divides leaves for nothing, again
 /// and again.
@@ -428,18 +438,24 @@ impl CoarseMesh {
     }
 }
 
-/// The point at which an element is probed. It depends on the element alone: a finer neighbour changes the triangles, and
-/// what the point sees is known already. It lies towards another edge of each element, so that what all miss is not the same.
-fn probe(solution: &Solution, element: NodeId) -> SampleQuery {
+/// The points at which an element is probed: one, and in a scene whose light is found by rays one for each `area`, m², of a large
+/// one. They depend on the element alone: a finer neighbour changes the triangles, and what the points see is known already.
+fn probes(solution: &Solution, element: NodeId, area: f64) -> Vec<SampleQuery> {
     let elements = &solution.elements;
     let outline = elements.outline(element);
-    let position = match solution.visibility {
+    let polygon = elements.polygon_of(element).unwrap_or_default();
+    let query = |position| SampleQuery { position, polygon, element, inward: DVec3::ZERO };
+    match solution.visibility {
+        // It lies towards another edge of each element, so that what all miss is not the same.
         Visibility::Links => {
             let corner = |i: usize| outline[(element as usize + i) % outline.len()];
-            elements.nodes[element as usize].centre * 0.6 + corner(0) * 0.3 + corner(1) * 0.1
+            vec![query(elements.nodes[element as usize].centre * 0.6 + corner(0) * 0.3 + corner(1) * 0.1)]
         }
-        Visibility::Rays => Fan::new(outline).place(DVec2::ZERO, element),
-    };
-    let polygon = elements.polygon_of(element).unwrap_or_default();
-    SampleQuery { position, polygon, element, inward: DVec3::ZERO }
+        // There are no lines of discontinuity, and light over small leaves is taken for linear: anywhere may be worst.
+        Visibility::Rays => {
+            let fan = Fan::new(outline);
+            let count = (elements.nodes[element as usize].area / area).ceil().clamp(1.0, MOST_PROBES) as u32;
+            (0..count).map(|i| query(fan.place(DVec2::ZERO, element.wrapping_add(i)))).collect()
+        }
+    }
 }
