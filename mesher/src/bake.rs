@@ -43,7 +43,7 @@ pub struct BakeOptions {
 const FIRST_SHARE: f64 = 0.36;
 
 /// The same in a scene whose reflected light is found by rays: what these scatter by is no bias, and does not add up.
-const FIRST_SHARE_BY_RAYS: f64 = 0.7;
+const FIRST_SHARE_BY_RAYS: f64 = 0.6;
 
 /// What the error is aimed at where a round has missed the tolerance, as a part of the tolerance; and by how much a share
 /// shrinks for it at most and at least. Less divides too much, more asks for one round more.
