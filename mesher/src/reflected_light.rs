@@ -190,20 +190,29 @@ impl ReflectedLight {
         let looked: Vec<(SampleQuery, Rgb)> =
             queries.into_iter().zip(Radiosity::of(scene, solution).received(&rows)).collect();
         let gather = Gather::with_source_error(scene, solution, options.source_error);
-        let errors = looked.chunk_by(|a, b| a.0.element == b.0.element).enumerate().map(|(leaf, probes)| {
-            let (element, count) = (probes[0].0.element, probes.len() as f64);
-            let irradiance = probes.iter().map(|(_, exact)| colour_mean(*exact)).sum::<f64>() / count;
-            let square = |(query, exact): &(SampleQuery, Rgb)| {
-                let baked = self.coarse.place(leaf, query).map_or(Rgb::ZERO, |place| self.coarse.at(place));
-                colour_mean((baked - exact) * (baked - exact))
-            };
-            let square = probes.iter().map(square).sum::<f64>() / count;
-            // A probe scatters, and so do the samples about it: what they differ by for that no division mends.
-            let chance = 2.0 * (1.0 + (BEYOND_CHANCE.powi(2) - 1.0) / count.sqrt());
-            let scatter = chance * (gather.scatter(element) * irradiance).powi(2);
-            LeafError { element, error: (square - scatter).max(0.0).sqrt(), irradiance }
-        });
-        Some(errors.collect())
+        let found: Vec<Found> = looked
+            .chunk_by(|a, b| a.0.element == b.0.element)
+            .enumerate()
+            .map(|(leaf, probes)| {
+                let (element, count) = (probes[0].0.element, probes.len() as f64);
+                let irradiance = probes.iter().map(|(_, exact)| colour_mean(*exact)).sum::<f64>() / count;
+                let square = |(query, exact): &(SampleQuery, Rgb)| {
+                    let baked = self.coarse.place(leaf, query).map_or(Rgb::ZERO, |place| self.coarse.at(place));
+                    colour_mean((baked - exact) * (baked - exact))
+                };
+                let square = probes.iter().map(square).sum::<f64>() / count;
+                // A probe scatters, and so do the samples about it.
+                let scatter = 2.0 * (gather.scatter(element) * irradiance).powi(2);
+                Found { element, irradiance, count, square, scatter }
+            })
+            .collect();
+        let more = more_scatter(&found);
+        let error = |found: &Found| {
+            let chance = 1.0 + (BEYOND_CHANCE.powi(2) - 1.0) / found.count.sqrt();
+            let error = (found.square - chance * more * found.scatter).max(0.0).sqrt();
+            LeafError { element: found.element, error, irradiance: found.irradiance }
+        };
+        Some(found.iter().map(error).collect())
     }
 
     /// Number of points at which reflectors were looked at.
@@ -277,6 +286,31 @@ impl ReflectedLight {
     }
 }
 
+/// What the probes of a leaf found.
+struct Found {
+    element: NodeId,
+    /// Their number, and the mean of the exact light over reflectors at them, averaged over the colours, W·m⁻².
+    count: f64,
+    irradiance: f64,
+    /// Mean square of what the coarse mesh is off by, and what is expected of it for what rays scatter by alone.
+    square: f64,
+    scatter: f64,
+}
+
+/// How many times as much as expected rays scatter, as a square, by half of all leaves: few are wanting, all scatter. What
+/// rays scatter by no division mends.
+fn more_scatter(found: &[Found]) -> f64 {
+    /// The median of the square of a normal deviate.
+    const MEDIAN: f64 = 0.455;
+    let mut times: Vec<f64> =
+        found.iter().filter(|leaf| leaf.scatter > 0.0).map(|leaf| leaf.square / leaf.scatter / MEDIAN).collect();
+    let middle = times.len() / 2;
+    if times.is_empty() {
+        return 1.0;
+    }
+    times.select_nth_unstable_by(middle, f64::total_cmp).1.clamp(1.0, MOST_SCATTER)
+}
+
 /// By node of the solution, which leaf of a front it is.
 fn leaf_numbers(solution: &Solution, front: &[NodeId]) -> Vec<Option<usize>> {
     let mut numbers = vec![None; solution.elements.nodes.len()];
@@ -309,6 +343,10 @@ const STALE: f64 = 3.0;
 /// less of what lies in large leaves, which make up most of the error where they are wrong.
 const PROBED: f64 = 1.0 / 6000.0;
 const MOST_PROBES: f64 = 4.0;
+
+/// How many times the square of what is expected rays are believed to scatter by at most: more, and it is not scatter that all
+/// leaves are off by.
+const MOST_SCATTER: f64 = 6.0;
 
 /// Standard deviations of what rays scatter by beyond which a difference is an error. Less divides leaves for nothing, again
 /// and again.

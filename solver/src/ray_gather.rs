@@ -30,7 +30,7 @@ const MOST_RAYS: f64 = 4096.0;
 
 /// Area of elements, as a part of that of all surfaces, from which on their points have all rays; those of smaller ones have fewer,
 /// as the root of the area is less, down to `FEW_RAYS`: there are many, and what each is off by is lost among them.
-const AMPLE: f64 = 1.0 / 6000.0;
+const AMPLE: f64 = 1.0 / 12_000.0;
 const FEW_RAYS: f64 = 0.25;
 
 /// How far from a contact a point is taken to be, along its direction of approach, as a fraction of the scene's size: above
