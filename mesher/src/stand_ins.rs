@@ -169,3 +169,84 @@ fn principal_axes(outline: &[DVec3], patch: &Patch) -> Option<(DVec3, Vec<DVec3>
     }
     Some((outline[0] + in_space(middle), axes))
 }
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+
+    use proptest::prelude::*;
+    use solver::{SolveOptions, solve};
+
+    use super::*;
+    use crate::testing::scene_of;
+    use crate::{edge_table, leaf_meshes, sample_table};
+
+    fn patch() -> Patch {
+        Patch { polygon: 0, root: 0, origin: DVec3::ZERO, u: DVec3::X, v: DVec3::Y }
+    }
+
+    fn square(corner: DVec3, side: f64) -> Vec<DVec3> {
+        [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)].map(|(x, y)| corner + DVec3::new(x, y, 0.0) * side).to_vec()
+    }
+
+    #[test]
+    fn principal_axes_of_nothing_a_strip_and_a_rectangle() {
+        assert_eq!(principal_axes(&[], &patch()), None);
+        assert_eq!(principal_axes(&[DVec3::ONE; 3], &patch()), None);
+        let rectangle = |x: f64, y: f64| [(0.0, 0.0), (x, 0.0), (x, y), (0.0, y)].map(|(x, y)| DVec3::new(x, y, 7.0));
+        // Gauss' points of a side lie at 1/√12 of it from the middle.
+        let (centre, axes) = principal_axes(&rectangle(1.0, 3.0), &patch()).unwrap();
+        assert!(centre.distance(DVec3::new(0.5, 1.5, 7.0)) < 1e-12);
+        assert!((axes[0].y.abs() - 3.0 / 12f64.sqrt()).abs() < 1e-12 && axes[0].x.abs() < 1e-12);
+        assert!((axes[1].x.abs() - 1.0 / 12f64.sqrt()).abs() < 1e-12 && axes.len() == 2);
+        let (_, axes) = principal_axes(&rectangle(5.0, 1.0), &patch()).unwrap();
+        assert!(axes.len() == 1 && axes[0].x.abs() > 1.0);
+    }
+
+    /// 420 small squares beside a large one, so that light is found by rays: over the small ones what is linear is reproduced
+    /// at every sample, by looks within them; the large one is looked at where it is asked.
+    #[test]
+    fn small_leaves_reproduce_what_is_linear_and_large_ones_are_asked_themselves() {
+        let small = (0..420).map(|i| square(DVec3::new(f64::from(i % 21), f64::from(i / 21), 0.0) * 0.01, 0.01));
+        let scene = scene_of(&small.chain([square(DVec3::new(0.0, 0.0, -5.0), 10.0)]).collect::<Vec<_>>());
+        let solution = solve(&scene, &SolveOptions::default(), &|_| ());
+        assert_eq!(solution.visibility, Visibility::Rays);
+        let leaf = |polygon, element| Leaf {
+            element,
+            polygon,
+            outline: solution.elements.outline(element).to_vec(),
+            segments: Vec::new(),
+        };
+        let of_polygon = |polygon| solution.leaves_of(polygon).into_iter().map(move |element| leaf(polygon, element));
+        let leaves: Vec<Leaf> = scene.polygon_ids().flat_map(of_polygon).collect();
+        let mesh = leaf_meshes(&edge_table(&scene, &[], &leaves));
+        let table = sample_table(&scene, &leaves, &mesh, &|_, _| solver::Contact::None);
+        let stand_ins = StandIns::new(&scene, &solution, &leaves, &mesh, &table);
+        let light = |position: DVec3| Rgb::new(1.0, 2.0, 3.0) * (1.0 + position.x + 2.0 * position.y);
+        let looked: Vec<Rgb> = stand_ins.queries.iter().map(|query| light(query.position)).collect();
+        let samples = stand_ins.of_samples(&looked);
+        for (sample, query) in samples.iter().zip(&table.queries) {
+            assert!((*sample - light(query.position)).abs().max_element() < 1e-12);
+        }
+        let asked = |polygon: u32| stand_ins.queries.iter().filter(|query| query.polygon == polygon).count();
+        assert_eq!(asked(7), 4);
+        assert_eq!(asked(420), table.queries.iter().filter(|query| query.polygon == 420).count());
+    }
+
+    proptest! {
+        #[test]
+        fn looks_lie_within_convex_outlines(angles in prop::collection::vec(0.0..std::f64::consts::TAU, 3..9), squeeze in 0.05..1.0f64) {
+            let mut angles = angles;
+            angles.sort_by(f64::total_cmp);
+            let outline: Vec<DVec3> =
+                angles.iter().map(|angle| DVec3::new(angle.cos(), angle.sin() * squeeze, 2.0)).collect();
+            let Some((centre, axes)) = principal_axes(&outline, &patch()) else { return Ok(()) };
+            for place in axes.iter().flat_map(|&axis| [centre + axis, centre - axis]) {
+                for (i, &corner) in outline.iter().enumerate() {
+                    let edge = outline[(i + 1) % outline.len()] - corner;
+                    prop_assert!(edge.cross(place - corner).z > -1e-9);
+                }
+            }
+        }
+    }
+}
