@@ -13,11 +13,12 @@ use std::sync::OnceLock;
 use glam::DVec3;
 use scene::{Rgb, Scene, luminance};
 
+use crate::backprojection::Viewpoint;
 use crate::clip::{Position, locate};
 use crate::emitter::{Emitter, emitter_tree, emitters};
 use crate::geometry::Geometry;
 use crate::leaf_gather::{LeafGather, SeenNode, Source};
-use crate::light_tree::LightTree;
+use crate::light_tree::{Horizon, LightTree};
 use crate::polygon_tree::PolygonTree;
 use crate::ray_gather::{RayGather, rays_for};
 use crate::shafts::Shafts;
@@ -44,6 +45,15 @@ pub enum Contact {
     },
     /// Contact ends or turns here: the value depends on the direction that the point is approached from.
     Corner,
+}
+
+/// Which normal the cosine of arriving light is to, on a polygon with shading normals ([`Scene::shading_normal`]).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Cosine {
+    /// The polygon's own: of light that it passes on.
+    Own,
+    /// The shading normal: of light that is looked at.
+    Shading,
 }
 
 /// Answers with the irradiance at points of a solved scene.
@@ -189,6 +199,21 @@ impl<'a> Gather<'a> {
         line.map_or(Contact::None, |direction| Contact::Line { direction })
     }
 
+    /// A point of a polygon as light arrives there; `inward` as [`Viewpoint`] has it.
+    pub(crate) fn viewpoint(&self, polygon: u32, position: DVec3, inward: DVec3, cosine: Cosine) -> Viewpoint {
+        let up = self.geometry.plane(polygon).normal;
+        let normal = match cosine {
+            Cosine::Own => None,
+            Cosine::Shading => self.scene.shading_normal(polygon, position),
+        };
+        Viewpoint { position, up, normal: normal.unwrap_or(up), inward }
+    }
+
+    /// What bounds the light on a polygon.
+    pub(crate) fn horizon(&self, polygon: u32) -> Horizon {
+        Horizon { plane: self.geometry.plane(polygon), tilt: self.scene.shading_tilt(polygon) }
+    }
+
     /// A gather for the points in the closure of one element.
     pub fn over(&'a self, element: NodeId) -> LeafGather<'a> {
         match self.emitter_tree {
@@ -206,8 +231,7 @@ impl<'a> Gather<'a> {
             Some(_) => {
                 let elements = &self.solution.elements;
                 let polygon = elements.polygon_of(element).unwrap_or_default();
-                let plane = self.geometry.plane(polygon);
-                let prominent = |rays: &RayGather| rays.prominent(self.solution, element, &plane);
+                let prominent = |rays: &RayGather| rays.prominent(self.solution, element, &self.horizon(polygon));
                 LeafGather {
                     gather: self,
                     polygon,
@@ -333,7 +357,7 @@ impl<'a> Gather<'a> {
         }
     }
 
-    /// Irradiance at a position in the plane of a polygon, W·m⁻²; `inward` is the direction in the plane from whose
+    /// Irradiance at a position in the plane of a polygon, by its shading normal if it has one, W·m⁻²; `inward` is the direction in the plane from whose
     /// side the limit is taken where other polygons touch the position. Finds the leaf by itself: for single points.
     pub fn irradiance_at(&self, polygon: u32, position: DVec3, inward: DVec3) -> Rgb {
         match self.leaf_under(polygon, position, DVec3::ZERO, inward) {

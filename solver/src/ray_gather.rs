@@ -7,12 +7,12 @@
 //! should. What it costs grows with the logarithm of the number of polygons.
 
 use glam::{DVec2, DVec3};
-use scene::{Bvh, Plane, Ray, Scene, luminance, other_sides};
+use scene::{Bvh, Ray, Scene, luminance, other_sides};
 
-use crate::form_factor::form_factor_at;
+use crate::backprojection::Viewpoint;
 use crate::lattice::{Arriving, Fan, STEP, hemisphere, shift};
 use crate::leaf_gather::SeenNode;
-use crate::light_tree::{Light, LightTree};
+use crate::light_tree::{Horizon, Light, LightTree};
 use crate::{NodeId, Patch, Solution};
 
 /// Rays from a point for a source error of `RAYS_ERROR`. What rays that are spread evenly miss falls with their number to the
@@ -44,11 +44,10 @@ const NEGLIGIBLE: f64 = 2.0;
 /// it of those over the hemisphere.
 const AIMED_RAYS: [u32; 2] = [1, 2];
 
-/// Where rays start: a position just in front of all that touches it, on a polygon.
+/// Where rays start: a point just in front of all that touches it, on a polygon.
 struct Origin {
     polygon: u32,
-    position: DVec3,
-    normal: DVec3,
+    point: Viewpoint,
     /// Of the lattices that rays from here are spread by.
     shift: DVec2,
 }
@@ -115,29 +114,22 @@ impl RayGather {
     }
 
     /// Root nodes of the patches that may send more than next to nothing to a point of an element.
-    pub fn prominent(&self, solution: &Solution, element: NodeId, plane: &Plane) -> Vec<NodeId> {
-        let cut = self.tree.cut(solution.elements.outline(element), plane, NEGLIGIBLE * self.budget);
+    pub fn prominent(&self, solution: &Solution, element: NodeId, horizon: &Horizon) -> Vec<NodeId> {
+        let cut = self.tree.cut(solution.elements.outline(element), horizon, NEGLIGIBLE * self.budget);
         cut.single.iter().map(|&number| self.roots[number as usize]).collect()
     }
 
-    /// Appends the nodes of reflectors that a position of a polygon sees; ascending, each once. `inward` is the
-    /// direction in the plane that a position is approached from where other polygons touch it; zero elsewhere. `prominent` are
-    /// patches that are to be looked at one by one.
+    /// Appends the nodes of reflectors that a point of a polygon sees; ascending, each once. `prominent` are patches that are to be
+    /// looked at one by one.
     pub fn seen_nodes(
         &self,
         solution: &Solution,
         prominent: &[NodeId],
         polygon: u32,
-        position: DVec3,
-        inward: DVec3,
+        point: &Viewpoint,
         seen: &mut Vec<SeenNode>,
     ) {
-        let from = Origin {
-            polygon,
-            position: position + inward * (ASIDE * self.size),
-            normal: self.normals[polygon as usize],
-            shift: shift(position, self.turn),
-        };
+        let from = Origin { polygon, point: point.aside(ASIDE * self.size), shift: shift(point.position, self.turn) };
         let first = seen.len();
         let looked_at: Vec<NodeId> =
             prominent.iter().copied().filter(|&root| self.look_at(solution, root, &from, seen)).collect();
@@ -153,10 +145,10 @@ impl RayGather {
             return false;
         }
         let outline = elements.outline(root);
-        if self.normals[polygon as usize].dot(from.position - outline[0]) <= self.size * ASIDE {
+        if self.normals[polygon as usize].dot(from.point.position - outline[0]) <= self.size * ASIDE {
             return false;
         }
-        let form_factor = form_factor_at(from.position, from.normal, outline);
+        let form_factor = from.point.form_factor(outline);
         let radiosity = self.reflectances[polygon as usize] * luminance(solution.light[root as usize].irradiance);
         if form_factor * radiosity <= NEGLIGIBLE * self.budget {
             return false;
@@ -177,7 +169,7 @@ impl RayGather {
         let misplaced = self.reflectances[polygon as usize] * light.deviation * form_factor;
         if record.child_count > 0 && misplaced > self.budget {
             for child in elements.children(node) {
-                let part = form_factor_at(from.position, from.normal, elements.outline(child));
+                let part = from.point.form_factor(elements.outline(child));
                 self.open(solution, child, part, from, seen);
             }
             return;
@@ -192,11 +184,10 @@ impl RayGather {
                 let met = elements.patches[self.patches[triangle as usize] as usize].polygon;
                 !self.is_own(from.polygon, met) && !self.is_own(polygon, met)
             };
-            self.bvh.is_blocked_among(from.position, place, hides)
+            self.bvh.is_blocked_among(from.point.position, place, hides)
         };
         let shift = from.shift + DVec2::splat(f64::from(node) * STEP.x);
-        let Arriving { share, middle } =
-            Fan::new(outline).arriving(from.position, from.normal, (shift, rays), is_blocked);
+        let Arriving { share, middle } = Fan::new(outline).arriving(&from.point, (shift, rays), is_blocked);
         if share > 0.0 {
             let offset = elements.patches[patch as usize].along(middle - record.centre);
             seen.push(SeenNode { node, form_factor: form_factor * share, offset });
@@ -208,13 +199,15 @@ impl RayGather {
         let elements = &solution.elements;
         let rays = self.rays[from.polygon as usize];
         let share = 1.0 / f64::from(rays);
-        for direction in hemisphere(from.normal, rays, from.shift) {
+        let Viewpoint { position, up, normal, .. } = from.point;
+        // About a shading normal some look below the polygon's plane, where nothing is seen.
+        for direction in hemisphere(normal, rays, from.shift).filter(|way| normal == up || up.dot(*way) > 0.0) {
             let meets = |triangle: u32| {
                 let met = elements.patches[self.patches[triangle as usize] as usize].polygon;
                 !self.is_own(from.polygon, met)
                     && (self.other_sides[met as usize].is_none() || self.normals[met as usize].dot(direction) < 0.0)
             };
-            let ray = Ray { origin: from.position, direction };
+            let ray = Ray { origin: position, direction };
             let Some(hit) = self.bvh.closest_hit_among(&ray, meets) else { continue };
             if hit.normal.dot(direction) >= 0.0 {
                 continue; // A back, which is black.
@@ -223,7 +216,7 @@ impl RayGather {
             if looked_at.binary_search(&frame.root).is_ok() {
                 continue;
             }
-            let place = from.position + direction * hit.distance;
+            let place = position + direction * hit.distance;
             let node = self.standing_for(solution, frame, place);
             let offset = frame.along(place - elements.nodes[node as usize].centre);
             seen.push(SeenNode { node, form_factor: share, offset });
@@ -322,13 +315,14 @@ mod tests {
         let solution = solve(&room, &SolveOptions { link_error: Some(0.1), bounces: None }, &|_| ());
         let gather = RayGather::new(&room, &solution, 256, 1e-3, 0);
         let floor = solution.patch_roots(4).next().expect("the floor is a patch");
-        let prominent = gather.prominent(&solution, floor, &room.plane(4));
+        let prominent = gather.prominent(&solution, floor, &Horizon { plane: room.plane(4), tilt: 0.0 });
         assert!(prominent.len() > 5);
         let mut sums = Vec::new();
         for i in 0..40 {
             let position = DVec3::new(0.1 + 0.094 * f64::from(i), 0.2 + f64::from(i * 7 % 40) * 0.065, 0.0);
             let mut seen = Vec::new();
-            gather.seen_nodes(&solution, &prominent, 4, position, DVec3::ZERO, &mut seen);
+            let point = Viewpoint { position, up: DVec3::Z, normal: DVec3::Z, inward: DVec3::ZERO };
+            gather.seen_nodes(&solution, &prominent, 4, &point, &mut seen);
             let sum: f64 = seen.iter().map(|seen| seen.form_factor).sum();
             sums.push(sum - 1.0);
         }
