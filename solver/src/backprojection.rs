@@ -45,12 +45,25 @@ pub struct Viewpoint {
     /// Direction in the receiver's plane: where something touches the point, the limit from point + ε·inward counts.
     /// Zero for a point that nothing touches.
     pub inward: DVec3,
+    /// What rises over the plane by no more than this, metres, is not met on any way from the point; minus infinity where all may be.
+    pub rise: f64,
 }
 
 impl Viewpoint {
+    /// A point of a flat surface, which is lit by its own normal.
+    pub fn flat(position: DVec3, up: DVec3, inward: DVec3) -> Self {
+        Self { position, up, normal: up, inward, rise: f64::NEG_INFINITY }
+    }
+
     /// The length of a way from the point times its cosine, as arriving light is weighed; 0 below a horizon.
     pub fn height(&self, way: DVec3) -> f64 {
         if self.up.dot(way) > 0.0 { self.normal.dot(way).max(0.0) } else { 0.0 }
+    }
+
+    /// Whether a way from the point may meet an outline. A round body's faces all hang below the plane of each, though rays from a
+    /// common corner seem to meet them.
+    pub fn may_meet(&self, outline: &[DVec3]) -> bool {
+        outline.iter().any(|corner| self.up.dot(corner - self.position) > self.rise)
     }
 
     /// The point so many metres along its direction of approach.
@@ -296,7 +309,8 @@ mod tests {
         [(-1., -1.), (-1., 1.), (1., 1.), (1., -1.)].map(|(a, b)| DVec3::new(x + a * half, y + b * half, z)).to_vec()
     }
 
-    const FROM: Viewpoint = Viewpoint { position: DVec3::ZERO, up: DVec3::Z, normal: DVec3::Z, inward: DVec3::X };
+    const FROM: Viewpoint =
+        Viewpoint { position: DVec3::ZERO, up: DVec3::Z, normal: DVec3::Z, inward: DVec3::X, rise: f64::NEG_INFINITY };
 
     fn visible(source: &[DVec3], blockers: &[Vec<DVec3>]) -> f64 {
         let mut fragments = Fragments::new(10.0);

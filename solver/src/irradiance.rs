@@ -33,6 +33,10 @@ const SOURCE_ERROR: f64 = 1e-3;
 /// What nodes may misplace where a bake is checked by other rays, as a part of what they may in the bake.
 const SMALLER: f64 = 0.25;
 
+/// What rises over the plane of a polygon with shading normals by no more than this fraction of the scene's size does not rise: in
+/// the six digits that files keep, the next faces of a round body seem to.
+const RISE: f64 = 1e-6;
+
 /// How other polygons touch a point of a polygon: how many values irradiance has there.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Contact {
@@ -154,7 +158,8 @@ impl<'a> Gather<'a> {
 
     /// How other polygons touch a point of a polygon, on its front.
     pub fn contact(&self, polygon: u32, position: DVec3) -> Contact {
-        let up = self.geometry.plane(polygon).normal;
+        let from = self.viewpoint(polygon, position, DVec3::ZERO, Cosine::Own);
+        let up = from.up;
         let mut line: Option<DVec3> = None;
         for other in self.tree.near(position, self.geometry.contact_tolerance) {
             let plane = self.geometry.plane(other);
@@ -163,6 +168,9 @@ impl<'a> Gather<'a> {
                 continue;
             }
             let outline = self.geometry.outline(other);
+            if !from.may_meet(outline) {
+                continue;
+            }
             let direction = match locate(outline, plane.normal, position, self.geometry.contact_tolerance) {
                 Position::Outside => continue,
                 Position::Interior => across.normalize(),
@@ -202,11 +210,15 @@ impl<'a> Gather<'a> {
     /// A point of a polygon as light arrives there; `inward` as [`Viewpoint`] has it.
     pub(crate) fn viewpoint(&self, polygon: u32, position: DVec3, inward: DVec3, cosine: Cosine) -> Viewpoint {
         let up = self.geometry.plane(polygon).normal;
+        let flat = Viewpoint::flat(position, up, inward);
+        if !self.scene.has_shading_normals(polygon) {
+            return flat;
+        }
         let normal = match cosine {
-            Cosine::Own => None,
-            Cosine::Shading => self.scene.shading_normal(polygon, position),
+            Cosine::Own => up,
+            Cosine::Shading => self.scene.shading_normal(polygon, position).unwrap_or(up),
         };
-        Viewpoint { position, up, normal: normal.unwrap_or(up), inward }
+        Viewpoint { normal, rise: RISE * self.geometry.size, ..flat }
     }
 
     /// What bounds the light on a polygon.

@@ -31,7 +31,8 @@ impl LeafGather<'_> {
         // What rays that are spread evenly are off by falls with their number to the power of −3/4.
         let relative = unoccluded / gather.budget().max(f64::MIN_POSITIVE);
         let rays = (relative / (2.0 * SCATTER)).powf(4.0 / 3.0).ceil().clamp(1.0, MOST_RAYS) as u32;
-        let is_blocked = |place| gather.tree.is_blocked(self.polygon, origin.position, place, &passes);
+        let passes = |polygon| passes(polygon) || !origin.may_meet(gather.geometry.outline(polygon));
+        let is_blocked = |place| gather.tree.is_blocked(self.polygon, origin.position, place, passes);
         Fan::new(outline).arriving(&origin, (shift(from.position, 0), rays), is_blocked).share
     }
 
@@ -49,7 +50,10 @@ impl LeafGather<'_> {
             let normal = gather.geometry.plane(polygon).normal;
             let square = way.length_squared().max(f64::MIN_POSITIVE);
             let per_area = origin.height(way) * normal.dot(-way).max(0.0) / (PI * square * square);
-            if per_area == 0.0 || gather.tree.is_blocked(self.polygon, origin.position, place, |other| other == polygon)
+            if per_area == 0.0
+                || gather.tree.is_blocked(self.polygon, origin.position, place, |other| {
+                    other == polygon || !origin.may_meet(gather.geometry.outline(other))
+                })
             {
                 return Rgb::ZERO;
             }

@@ -129,7 +129,7 @@ mod tests {
         let outline = [(-1.0, -1.0), (-1.0, 1.0), (1.0, 1.0), (1.0, -1.0)].map(|(x, y)| DVec3::new(x, y, 2.0));
         let fan = Fan::new(&outline);
         let seen = |up, is_blocked: &dyn Fn(DVec3) -> bool| {
-            let from = Viewpoint { position: DVec3::ZERO, up, normal: up, inward: DVec3::ZERO };
+            let from = Viewpoint::flat(DVec3::ZERO, up, DVec3::ZERO);
             fan.arriving(&from, (shift(DVec3::ONE, 3), 400), is_blocked)
         };
         let half = seen(DVec3::Z, &|place| place.x > 0.0);

@@ -181,8 +181,10 @@ impl RayGather {
             AIMED_RAYS[usize::from(is_bright)].max((form_factor * f64::from(self.rays[from.polygon as usize])) as u32);
         let is_blocked = |place: DVec3| {
             let hides = |triangle: u32| {
-                let met = elements.patches[self.patches[triangle as usize] as usize].polygon;
-                !self.is_own(from.polygon, met) && !self.is_own(polygon, met)
+                let Patch { polygon: met, root, .. } = elements.patches[self.patches[triangle as usize] as usize];
+                !self.is_own(from.polygon, met)
+                    && !self.is_own(polygon, met)
+                    && from.point.may_meet(elements.outline(root))
             };
             self.bvh.is_blocked_among(from.point.position, place, hides)
         };
@@ -203,8 +205,9 @@ impl RayGather {
         // About a shading normal some look below the polygon's plane, where nothing is seen.
         for direction in hemisphere(normal, rays, from.shift).filter(|way| normal == up || up.dot(*way) > 0.0) {
             let meets = |triangle: u32| {
-                let met = elements.patches[self.patches[triangle as usize] as usize].polygon;
+                let Patch { polygon: met, root, .. } = elements.patches[self.patches[triangle as usize] as usize];
                 !self.is_own(from.polygon, met)
+                    && from.point.may_meet(elements.outline(root))
                     && (self.other_sides[met as usize].is_none() || self.normals[met as usize].dot(direction) < 0.0)
             };
             let ray = Ray { origin: position, direction };
@@ -321,7 +324,7 @@ mod tests {
         for i in 0..40 {
             let position = DVec3::new(0.1 + 0.094 * f64::from(i), 0.2 + f64::from(i * 7 % 40) * 0.065, 0.0);
             let mut seen = Vec::new();
-            let point = Viewpoint { position, up: DVec3::Z, normal: DVec3::Z, inward: DVec3::ZERO };
+            let point = Viewpoint::flat(position, DVec3::Z, DVec3::ZERO);
             gather.seen_nodes(&solution, &prominent, 4, &point, &mut seen);
             let sum: f64 = seen.iter().map(|seen| seen.form_factor).sum();
             sums.push(sum - 1.0);

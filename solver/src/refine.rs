@@ -243,7 +243,7 @@ impl Network {
         if blockers.is_empty() || unoccluded == 0.0 {
             return unoccluded;
         }
-        let from = Viewpoint { position, up, normal: up, inward: DVec3::ZERO };
+        let from = Viewpoint::flat(position, up, DVec3::ZERO);
         let corners: Vec<DVec3> = outline.iter().map(|corner| corner - position).collect();
         fragments.start(&corners, &from);
         for blocker in blockers {
