@@ -424,3 +424,6 @@ impl<'a> Gather<'a> {
         None
     }
 }
+
+#[cfg(test)]
+mod tests;

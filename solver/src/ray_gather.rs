@@ -320,7 +320,7 @@ mod tests {
         let floor = solution.patch_roots(4).next().expect("the floor is a patch");
         let prominent = gather.prominent(&solution, floor, &Horizon { plane: room.plane(4), tilt: 0.0 });
         assert!(prominent.len() > 5);
-        let mut sums = Vec::new();
+        let (mut sums, mut turned_sums) = (Vec::new(), Vec::new());
         for i in 0..40 {
             let position = DVec3::new(0.1 + 0.094 * f64::from(i), 0.2 + f64::from(i * 7 % 40) * 0.065, 0.0);
             let mut seen = Vec::new();
@@ -328,9 +328,19 @@ mod tests {
             gather.seen_nodes(&solution, &prominent, 4, &point, &mut seen);
             let sum: f64 = seen.iter().map(|seen| seen.form_factor).sum();
             sums.push(sum - 1.0);
+            // About a shading normal the part below the plane is missing: (1 + cos θ)/2 is left.
+            let (sin, cos) = (0.1 * f64::from(i % 13)).sin_cos();
+            let (y, x) = f64::from(i).sin_cos();
+            let turned = Viewpoint { normal: DVec3::new(sin * x, sin * y, cos), ..point };
+            seen.clear();
+            gather.seen_nodes(&solution, &prominent, 4, &turned, &mut seen);
+            let sum: f64 = seen.iter().map(|seen| seen.form_factor).sum();
+            turned_sums.push(sum - (1.0 + cos) / 2.0);
         }
-        let mean = sums.iter().sum::<f64>() / 40.0;
-        let square = (sums.iter().map(|x| x * x).sum::<f64>() / 40.0).sqrt();
-        assert!(mean.abs() < 0.01 && square < 0.05, "{mean} {square}");
+        for sums in [sums, turned_sums] {
+            let mean = sums.iter().sum::<f64>() / 40.0;
+            let square = (sums.iter().map(|x| x * x).sum::<f64>() / 40.0).sqrt();
+            assert!(mean.abs() < 0.01 && square < 0.05, "{mean} {square}");
+        }
     }
 }
