@@ -148,7 +148,8 @@ impl LightTree {
         if *tilt > 0.0 {
             cosine = (cosine.asin() + tilt).min(FRAC_PI_2).sin();
         }
-        self.power(index) * cosine * (reach / square.sqrt()).min(1.0) / (PI * square)
+        let cosines = cosine * (reach / square.sqrt()).min(1.0);
+        self.power(index) * cosines / (PI * square)
     }
 
     /// Power of a group, luminance, W.
