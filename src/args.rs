@@ -226,7 +226,7 @@ pub struct ProbeFlags {
     /// How a scene is read
     #[command(flatten)]
     pub reading: SceneFlags,
-    /// Points and normals: a CSV file with the header x,y,z,nx,ny,nz
+    /// Points and normals of faces: a CSV file with the header x,y,z,nx,ny,nz; on faces with shading normals light is told by these
     #[arg(long, value_name = "POINTS.csv")]
     pub points: PathBuf,
     /// Where the irradiance goes; stdout without it

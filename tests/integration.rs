@@ -25,5 +25,6 @@ mod readme;
 mod real_scenes;
 mod reference;
 mod robustness;
+mod smooth_shading;
 mod textures;
 mod verify;

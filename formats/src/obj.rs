@@ -23,10 +23,10 @@ pub(crate) fn read_obj(path: &Path, report: &mut ImportReport) -> Result<Model, 
     }
     // Names and comments may be in any encoding; the rest is ASCII.
     let text = obj_text::check(path, &String::from_utf8_lossy(&bytes))?;
-    if text.face_lines.is_empty() {
+    if text.faces.is_empty() {
         return Err(FormatError::content(path, "has no faces", "export the scene as polygons"));
     }
-    report.polygons_read = text.face_lines.len();
+    report.polygons_read = text.faces.len();
     warn_of_text(&text, report);
     let materials = read_materials(path, &text.libraries, &text.materials, report)?;
     let names =
@@ -39,7 +39,7 @@ pub(crate) fn read_obj(path: &Path, report: &mut ImportReport) -> Result<Model, 
     let mut model =
         Model { materials: materials.list, textures: materials.textures, cameras: named(&text), ..Model::default() };
     let (mut objects, mut unassigned) = (HashMap::new(), None);
-    let mut lines = text.face_lines.iter().copied();
+    let mut lines = text.faces.iter().copied();
     for tobj::Model { mesh, name } in meshes {
         // tobj leaves the list out where all faces are triangles.
         let triangles = if mesh.face_arities.is_empty() { mesh.indices.len() / 3 } else { 0 };
@@ -73,10 +73,12 @@ pub(crate) fn read_obj(path: &Path, report: &mut ImportReport) -> Result<Model, 
             }
             let vertices: Vec<u32> = mesh.indices[places.clone()].iter().map(|index| first_vertex + index).collect();
             let outline: Vec<DVec3> = vertices.iter().map(|&vertex| model.positions[vertex as usize]).collect();
-            let mut attributes: Vec<_> = places.map(|corner| attributes(&mesh, corner, textured)).collect();
+            let textured = textured && line.has_texture_coordinates;
+            let mut attributes: Vec<_> =
+                places.map(|corner| attributes(&mesh, corner, (textured, line.has_normals))).collect();
             let seams = model.attributes.seams(&outline, &mut attributes);
             let corners = vertices.into_iter().zip(seams).map(|(vertex, seam)| Corner { vertex, seam });
-            model.faces.push(Face { corners: corners.collect(), material, object, line });
+            model.faces.push(Face { corners: corners.collect(), material, object, line: line.line });
         }
     }
     if report.transparent_faces > 0 {
@@ -89,13 +91,15 @@ pub(crate) fn read_obj(path: &Path, report: &mut ImportReport) -> Result<Model, 
     Ok(model)
 }
 
-/// What a corner has beside its position. Texture coordinates matter where there is a texture; an OBJ counts v upwards.
-fn attributes(mesh: &tobj::Mesh, corner: usize, textured: bool) -> Attributes {
+/// What a corner has beside its position, if its face is textured and if it has normals. An OBJ counts v upwards.
+fn attributes(mesh: &tobj::Mesh, corner: usize, (textured, has_normals): (bool, bool)) -> Attributes {
     let texture = mesh.texcoord_indices.get(corner).and_then(|&i| mesh.texcoords.get(2 * i as usize..)?.first_chunk());
     let normal = mesh.normal_indices.get(corner).and_then(|&i| mesh.normals.get(3 * i as usize..)?.first_chunk());
     Attributes {
         uv: texture.filter(|_| textured).map(|&[u, v]: &[f64; 2]| DVec2::new(u, 1.0 - v).as_vec2()),
-        normal: normal.map(|&normal: &[f64; 3]| DVec3::from_array(normal).normalize_or_zero().as_vec3()),
+        normal: normal
+            .filter(|_| has_normals)
+            .map(|&normal: &[f64; 3]| DVec3::from_array(normal).normalize_or_zero().as_vec3()),
     }
 }
 

@@ -25,8 +25,8 @@ pub(crate) type Named = (usize, String);
 pub(crate) struct ObjText {
     /// Vertices, faces, groups and material names in the order of the file, in the form that tobj reads right.
     pub clean: String,
-    /// Line of every face, in order.
-    pub face_lines: Vec<usize>,
+    /// Every face, in order.
+    pub faces: Vec<FaceLine>,
     /// Material libraries.
     pub libraries: Vec<Named>,
     /// Materials by the faces' use, each name once.
@@ -37,6 +37,15 @@ pub(crate) struct ObjText {
     pub bad_cameras: Vec<usize>,
     /// Lines with free-form curves and surfaces.
     pub free_form: Vec<usize>,
+}
+
+/// A face, and what all of its corners name beside positions: for what is missing tobj takes that of another corner.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct FaceLine {
+    /// Its line, from 1.
+    pub line: usize,
+    pub has_texture_coordinates: bool,
+    pub has_normals: bool,
 }
 
 /// Checks an OBJ text. Errors name the first line that is wrong.
@@ -77,8 +86,8 @@ pub(crate) fn check(path: &Path, text: &str) -> Result<ObjText, FormatError> {
                 writeln!(clean, "vn {x:?} {y:?} {z:?}")
             }
             "f" | "fo" => {
-                check_face(rest, counts).map_err(wrong)?;
-                checked.face_lines.push(number);
+                let [has_texture_coordinates, has_normals] = check_face(rest, counts).map_err(wrong)?;
+                checked.faces.push(FaceLine { line: number, has_texture_coordinates, has_normals });
                 writeln!(clean, "f {rest}")
             }
             "g" | "o" => writeln!(clean, "g {rest}"),
@@ -158,9 +167,10 @@ fn position(rest: &str) -> Result<[f64; 3], Wrong> {
 }
 
 /// Checks the corners of a face, `v`, `v/vt`, `v//vn` or `v/vt/vn` with indices from 1 or from −1 backwards, against
-/// the numbers of positions, texture coordinates and normals so far.
-fn check_face(rest: &str, counts: [usize; 3]) -> Result<(), Wrong> {
+/// the numbers of positions, texture coordinates and normals so far. Whether all corners have texture coordinates, and normals.
+fn check_face(rest: &str, counts: [usize; 3]) -> Result<[bool; 2], Wrong> {
     const KINDS: [&str; 3] = ["vertices", "texture coordinates", "normals"];
+    let mut all_have = [true; 2];
     for (i, word) in rest.split_whitespace().enumerate() {
         if i >= MOST_CORNERS {
             return Err((format!("a face of more than {MOST_CORNERS} corners"), "split it in a modeller"));
@@ -168,6 +178,9 @@ fn check_face(rest: &str, counts: [usize; 3]) -> Result<(), Wrong> {
         let fields: Vec<&str> = word.split('/').collect();
         if fields.len() > 3 || fields[0].is_empty() {
             return Err((format!("{} is not a corner of a face", shown(word)), "write v, v/vt, v//vn or v/vt/vn"));
+        }
+        for (i, has) in all_have.iter_mut().enumerate() {
+            *has &= fields.get(i + 1).is_some_and(|field| !field.is_empty());
         }
         for ((field, count), kind) in
             fields.into_iter().zip(counts).zip(KINDS).filter(|((field, _), _)| !field.is_empty())
@@ -183,7 +196,7 @@ fn check_face(rest: &str, counts: [usize; 3]) -> Result<(), Wrong> {
             }
         }
     }
-    Ok(())
+    Ok(all_have)
 }
 
 /// A piece of a file as a message shows it: short, and without control characters.
@@ -242,7 +255,7 @@ mod tests {
             text.clean,
             "v 0.0 0.0 0.0\nv 1.0 0.0 0.0\nv 0.0 1.0 0.0\nvt 0.5 0.0\ng with a tab\nusemtl red\nf 1/1 2/1  3/1\n"
         );
-        assert_eq!((text.face_lines, text.free_form), (vec![10], vec![12]));
+        assert_eq!((text.faces[0].line, text.faces.len(), text.free_form), (10, 1, vec![12]));
         assert_eq!(text.materials, [(9, "red".to_owned())]);
     }
 

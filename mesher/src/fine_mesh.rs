@@ -9,7 +9,7 @@ use std::sync::{Mutex, PoisonError};
 use glam::DVec3;
 use rayon::prelude::*;
 use scene::{DiscontinuityLine, Rgb, Scene};
-use solver::{Gather, NodeId, Shafts, Solution};
+use solver::{Cosine, Gather, NodeId, Shafts, Solution};
 
 use crate::guess::guessed_emitted;
 use crate::inquiry::Inquiry;
@@ -32,8 +32,10 @@ pub(crate) struct FineMesh {
     pub lines: Vec<DiscontinuityLine>,
     pub mesh: Mesh,
     pub table: SampleTable,
-    /// Irradiance from emitters at each sample of the table, W·m⁻².
+    /// Irradiance from emitters at each sample of the table, W·m⁻², by polygons' own normals: what surfaces pass on.
     pub emitted: Vec<Rgb>,
+    /// The same by shading normals: what is looked at.
+    pub shown: Vec<Rgb>,
     /// The same at each triangle's probe point.
     probed: Vec<Rgb>,
 }
@@ -62,14 +64,20 @@ impl FineMesh {
         let mesh = leaf_meshes(&edge_table(scene, &solution.cuts, &leaves));
         let gather = Gather::with_source_error(scene, solution, dim);
         let table = sample_table(scene, &leaves, &mesh, &|polygon, position| gather.contact(polygon, position));
-        let mut fine = Self { leaves, lines, mesh, table, emitted: Vec::new(), probed: Vec::new() };
-        let probes: Vec<SampleQuery> = (0..fine.triangles()).map(|triangle| fine.probe_query(triangle)).collect();
+        let mut fine = Self { leaves, lines, mesh, table, emitted: Vec::new(), shown: Vec::new(), probed: Vec::new() };
+        let probes: Vec<SampleQuery> =
+            (0..fine.triangles()).map(|triangle| fine.probe_query(triangle).looked_at(scene)).collect();
         let small = SMALL_PATCH * scene.size();
         let stands_in = |query: &SampleQuery| middle_of_small(solution, query, small).unwrap_or(*query);
         let queries: Vec<SampleQuery> = fine.table.queries.iter().map(stands_in).collect();
-        known.find(&gather, queries.iter().chain(&probes), inquiry);
+        let (samples, shaded) = fine.table.shaded(scene);
+        known.find(&gather, queries.iter().chain(&shaded).chain(&probes), inquiry);
         known.shafts.retain(|&element, _| solution.elements.is_leaf(element));
         fine.emitted = known.at(solution, &queries, inquiry);
+        fine.shown = fine.emitted.clone();
+        for (sample, light) in samples.into_iter().zip(known.at(solution, &shaded, inquiry)) {
+            fine.shown[sample] = light;
+        }
         fine.probed = known.at(solution, &probes, inquiry);
         fine
     }
@@ -89,7 +97,7 @@ impl FineMesh {
     pub fn probe_emitted(&self) -> Vec<(f64, f64)> {
         (0..self.triangles())
             .map(|triangle| {
-                let samples = self.table.triangles[triangle].map(|sample| self.emitted[sample as usize]);
+                let samples = self.table.triangles[triangle].map(|sample| self.shown[sample as usize]);
                 let (s, t) = probe_point(self.probe_number(triangle));
                 let difference = scene::Interpolant::through(samples).evaluate(s, t) - self.probed[triangle];
                 (colour_mean(difference * difference).sqrt(), colour_mean(self.probed[triangle]))
@@ -109,7 +117,7 @@ impl FineMesh {
         let Leaf { polygon, element, .. } = self.leaves[self.mesh.triangles[triangle].leaf as usize];
         let (s, t) = probe_point(self.probe_number(triangle));
         let position = a * (1.0 - s - t) + b * s + c * t;
-        SampleQuery { position, polygon, element, inward: DVec3::ZERO }
+        SampleQuery { position, polygon, element, inward: DVec3::ZERO, cosine: Cosine::Own }
     }
 }
 
@@ -131,7 +139,7 @@ impl EmittedLight {
             let element = group[0].element;
             let mut own = locked().remove(&element).unwrap_or_default();
             let leaf = gather.over_emitters(element, &mut own);
-            let light = group.iter().map(|query| leaf.emitted(query.position, query.inward)).collect();
+            let light = group.iter().map(|query| leaf.emitted(query.position, query.inward, query.cosine)).collect();
             locked().insert(element, own);
             light
         });

@@ -41,7 +41,7 @@ pub(crate) fn held(solution: &Solution, fine: &FineMesh) -> usize {
     let leaf = |leaf: &Leaf| {
         size_of::<Leaf>() + size_of_val(leaf.outline.as_slice()) + leaf.segments.len() * size_of::<LeafSegment>()
     };
-    let of_sample = size_of::<SampleQuery>() + size_of::<scene::Rgb>();
+    let of_sample = size_of::<SampleQuery>() + 2 * size_of::<scene::Rgb>();
     let of_triangle = size_of::<MeshTriangle>() + size_of::<[u32; 6]>() + size_of::<scene::Rgb>();
     let mesh = fine.leaves.iter().map(leaf).sum::<usize>()
         + size_of_val(fine.mesh.vertices.as_slice())

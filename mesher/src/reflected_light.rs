@@ -14,7 +14,7 @@ use std::collections::HashMap;
 use glam::{DVec2, DVec3, Vec3};
 use rayon::prelude::*;
 use scene::{Interpolant, Rgb, Scene, Seen};
-use solver::{ElementLight, Fan, Gather, NodeId, SeenNode, Solution, Visibility};
+use solver::{Cosine, ElementLight, Fan, Gather, NodeId, SeenNode, Solution, Visibility};
 
 use crate::fine_mesh::FineMesh;
 use crate::inquiry::Inquiry;
@@ -45,11 +45,21 @@ type Row = [Seen];
 struct CoarseMesh {
     leaves: Vec<Leaf>,
     mesh: Mesh,
+    /// After the samples' queries come those by shading normals, where there are such.
     table: SampleTable,
     /// First triangle of each leaf, and their number at the end.
     first: Vec<usize>,
-    /// Irradiance over reflectors at each sample, W·m⁻².
+    /// By query, irradiance over reflectors, W·m⁻².
     values: Vec<Rgb>,
+    /// By sample, the query for what is looked at.
+    looked_at: Vec<u32>,
+}
+
+/// Which light is read from a coarse mesh.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Light {
+    PassedOn,
+    LookedAt,
 }
 
 /// What the coarse mesh gets wrong on one leaf.
@@ -112,7 +122,7 @@ impl ReflectedLight {
             if is_first || solution.bounces.is_some() { vec![Rgb::ZERO; samples] } else { receive(solution) };
         for _ in 0..solution.bounces.unwrap_or(MOST_ITERATIONS) {
             self.coarse.values = values;
-            self.reflecting = total(&self.coarse, fine, &places);
+            self.reflecting = total(&self.coarse, Light::PassedOn, &fine.emitted, &places);
             solution.set_light(projection.planes(&self.reflecting));
             values = receive(solution);
             let moved = largest_move(&self.coarse.values, &values);
@@ -166,9 +176,9 @@ impl ReflectedLight {
         }
     }
 
-    /// The irradiance from everywhere at the samples of a fine mesh, W·m⁻².
+    /// The irradiance from everywhere that is looked at, at the samples of a fine mesh, W·m⁻².
     pub fn irradiance(&self, solution: &Solution, fine: &FineMesh) -> Vec<Rgb> {
-        total(&self.coarse, fine, &self.places(solution, fine))
+        total(&self.coarse, Light::LookedAt, &fine.shown, &self.places(solution, fine))
     }
 
     /// The errors of all leaves of the front, each at one point, by what such a point sees. None if the bake is stopped.
@@ -180,8 +190,9 @@ impl ReflectedLight {
         inquiry: &mut Inquiry<'_>,
     ) -> Option<Vec<LeafError>> {
         let area: f64 = scene.polygon_ids().map(|polygon| scene.area(polygon)).sum();
+        let probes = |&leaf: &NodeId| probes(solution, leaf, PROBED * area);
         let queries: Vec<SampleQuery> =
-            self.front.iter().flat_map(|&leaf| probes(solution, leaf, PROBED * area)).collect();
+            self.front.iter().flat_map(probes).map(|query| query.looked_at(scene)).collect();
         self.look(scene, solution, &queries, options, STALE_PROBE, inquiry);
         if inquiry.stopped() {
             return None;
@@ -197,7 +208,7 @@ impl ReflectedLight {
                 let (element, count) = (probes[0].0.element, probes.len() as f64);
                 let irradiance = probes.iter().map(|(_, exact)| colour_mean(*exact)).sum::<f64>() / count;
                 let square = |(query, exact): &(SampleQuery, Rgb)| {
-                    let baked = self.coarse.place(leaf, query).map_or(Rgb::ZERO, |place| self.coarse.at(place));
+                    let baked = self.coarse.place(leaf, query).map_or(Rgb::ZERO, |place| self.coarse.at(place, Light::LookedAt));
                     colour_mean((baked - exact) * (baked - exact))
                 };
                 let square = probes.iter().map(square).sum::<f64>() / count;
@@ -254,13 +265,14 @@ impl ReflectedLight {
             .filter(|query| self.rows.get(&query.key()).is_none_or(|&row| is_stale(&gather, inquiry.row(row), allowed)))
             .collect();
         let mut unknown = unknown;
+        unknown.sort_by_key(|query| query.element);
         unknown.dedup_by_key(|query| query.key());
         let found = inquiry.rows(&unknown, solution.elements.nodes.len(), |group| {
             let element = gather.over_reflectors(group[0].element);
             let mut seen = Vec::new();
             let row = |query: &&SampleQuery| {
                 seen.clear();
-                element.seen_nodes(query.position, query.inward, &mut seen);
+                element.seen_nodes(query.position, query.inward, query.cosine, &mut seen);
                 seen.iter().map(in_few_digits).collect()
             };
             group.iter().map(row).collect()
@@ -406,9 +418,9 @@ impl Radiosity {
     }
 }
 
-fn total(coarse: &CoarseMesh, fine: &FineMesh, places: &[Option<Place>]) -> Vec<Rgb> {
-    let reflected = |place: &Option<Place>| place.map_or(Rgb::ZERO, |place| coarse.at(place));
-    fine.emitted.iter().zip(places).map(|(&emitted, place)| emitted + reflected(place)).collect()
+fn total(coarse: &CoarseMesh, light: Light, emitted: &[Rgb], places: &[Option<Place>]) -> Vec<Rgb> {
+    let reflected = |place: &Option<Place>| place.map_or(Rgb::ZERO, |place| coarse.at(place, light));
+    emitted.iter().zip(places).map(|(&emitted, place)| emitted + reflected(place)).collect()
 }
 
 fn largest_move(from: &[Rgb], to: &[Rgb]) -> f64 {
@@ -434,7 +446,7 @@ impl CoarseMesh {
         let leaves: Vec<Leaf> = front.iter().map(leaf).collect();
         let mesh = leaf_meshes(&edge_table(scene, &solution.cuts, &leaves));
         let gather = Gather::new(scene, solution);
-        let table = sample_table(scene, &leaves, &mesh, &|polygon, position| gather.contact(polygon, position));
+        let mut table = sample_table(scene, &leaves, &mesh, &|polygon, position| gather.contact(polygon, position));
         let mut first = vec![0; leaves.len() + 1];
         for triangle in &mesh.triangles {
             first[triangle.leaf as usize + 1] += 1;
@@ -442,8 +454,14 @@ impl CoarseMesh {
         for i in 1..first.len() {
             first[i] += first[i - 1];
         }
+        let mut looked_at: Vec<u32> = (0..table.queries.len() as u32).collect();
+        let (samples, shaded) = table.shaded(scene);
+        for (number, sample) in (table.queries.len() as u32..).zip(samples) {
+            looked_at[sample] = number;
+        }
+        table.queries.extend(shaded);
         let values = vec![Rgb::ZERO; table.queries.len()];
-        Self { leaves, mesh, table, first, values }
+        Self { leaves, mesh, table, first, values, looked_at }
     }
 
     fn corners(&self, triangle: usize) -> [DVec3; 3] {
@@ -451,9 +469,12 @@ impl CoarseMesh {
     }
 
     /// The value at a place, never negative.
-    fn at(&self, place: Place) -> Rgb {
-        let samples = self.table.triangles[place.triangle as usize];
-        Interpolant::through(samples.map(|sample| self.values[sample as usize])).evaluate(place.s, place.t)
+    fn at(&self, place: Place, light: Light) -> Rgb {
+        let samples = self.table.triangles[place.triangle as usize].map(|sample| match light {
+            Light::PassedOn => sample,
+            Light::LookedAt => self.looked_at[sample as usize],
+        });
+        Interpolant::through(samples.map(|query| self.values[query as usize])).evaluate(place.s, place.t)
     }
 
     /// Where a query lies within a leaf: in the triangle that it is deepest in.
@@ -482,7 +503,7 @@ fn probes(solution: &Solution, element: NodeId, area: f64) -> Vec<SampleQuery> {
     let elements = &solution.elements;
     let outline = elements.outline(element);
     let polygon = elements.polygon_of(element).unwrap_or_default();
-    let query = |position| SampleQuery { position, polygon, element, inward: DVec3::ZERO };
+    let query = |position| SampleQuery { position, polygon, element, inward: DVec3::ZERO, cosine: Cosine::Own };
     match solution.visibility {
         // It lies towards another edge of each element, so that what all miss is not the same.
         Visibility::Links => {

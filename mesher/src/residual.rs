@@ -12,7 +12,7 @@ use glam::{DVec2, DVec3};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use scene::{Bvh, Interpolant, Ray, Rgb, Scene, other_sides};
-use solver::{Gather, NodeId, SeenNode, Shafts, Solution, Visibility, hemisphere};
+use solver::{Cosine, Gather, NodeId, SeenNode, Shafts, Solution, Visibility, hemisphere};
 
 use crate::fine_mesh::FineMesh;
 use crate::inquiry::Inquiry;
@@ -108,11 +108,12 @@ pub(crate) fn residual(
         let position = at(fine.corners(triangle), (s, t));
         let element = gather.over(leaf.element);
         let mut seen = Vec::new();
-        element.seen_nodes(position, DVec3::ZERO, &mut seen);
+        element.seen_nodes(position, DVec3::ZERO, Cosine::Shading, &mut seen);
         seen.iter_mut().for_each(|seen| seen.offset = DVec2::ZERO);
-        let known = element.emitted(position, DVec3::ZERO) + gather.irradiance_from(&seen);
+        let known = element.emitted(position, DVec3::ZERO, Cosine::Shading) + gather.irradiance_from(&seen);
         let seen_nodes: HashSet<NodeId> = seen.iter().map(|seen| seen.node).collect();
-        let normal = normals[leaf.polygon as usize];
+        let own = normals[leaf.polygon as usize];
+        let normal = scene.shading_normal(leaf.polygon, position).unwrap_or(own);
         let mut random = ChaCha8Rng::seed_from_u64(number as u64);
         let differs = |direction| correction(position, direction, leaf.polygon, &seen_nodes).unwrap_or(Rgb::ZERO);
         // A ray scatters by what it finds, and finds a node as often as its form factor says: known before the first ray,
@@ -123,7 +124,8 @@ pub(crate) fn residual(
         let rays = if seen.is_empty() { 0 } else { (scatter / (accepted * accepted)).clamp(RAYS[0], RAYS[1]) as u32 };
         let halves = [(); 2].map(|()| {
             let shift = DVec2::new(uniform(&mut random), uniform(&mut random));
-            let sum: Rgb = hemisphere(normal, rays, shift).map(differs).sum();
+            let above = |direction: &DVec3| normal == own || own.dot(*direction) > 0.0;
+            let sum: Rgb = hemisphere(normal, rays, shift).filter(above).map(differs).sum();
             known + sum / f64::from(rays.max(1))
         });
         let baked = value(samples, triangle, s, t);
@@ -149,10 +151,11 @@ fn residual_by_rays(
     inquiry.residuals(&points(fine), |_, (triangle, s, t)| {
         let leaf = &fine.leaves[fine.mesh.triangles[triangle].leaf as usize];
         let position = at(fine.corners(triangle), (s, t));
-        let emitted = halves[0].over_emitters(leaf.element, &mut Shafts::default()).emitted(position, DVec3::ZERO);
+        let emitters = halves[0].over_emitters(leaf.element, &mut Shafts::default());
+        let emitted = emitters.emitted(position, DVec3::ZERO, Cosine::Shading);
         let halves = halves.each_ref().map(|half| {
             let mut seen = Vec::new();
-            half.over_reflectors(leaf.element).seen_nodes(position, DVec3::ZERO, &mut seen);
+            half.over_reflectors(leaf.element).seen_nodes(position, DVec3::ZERO, Cosine::Shading, &mut seen);
             emitted + half.irradiance_from(&seen)
         });
         let baked =

@@ -132,11 +132,11 @@ impl Rounds<'_> {
     /// Irradiance at the samples of a mesh, W·m⁻².
     pub fn samples(&self, fine: &FineMesh) -> Vec<Rgb> {
         if !self.solution.reflects() {
-            return fine.emitted.clone();
+            return fine.shown.clone();
         }
         if self.inquiry.stopped() && !self.reflected.is_known() {
             let guess = |query| guessed_reflected(&self.solution, query, self.reflectance);
-            return fine.table.queries.iter().zip(&fine.emitted).map(|(query, light)| light + guess(query)).collect();
+            return fine.table.queries.iter().zip(&fine.shown).map(|(query, light)| light + guess(query)).collect();
         }
         self.reflected.irradiance(&self.solution, fine)
     }
@@ -166,7 +166,7 @@ impl Rounds<'_> {
         let mut fine = self.fine_mesh();
         if std::mem::take(&mut self.is_guessed) {
             let guess = self.mean;
-            self.take_means(&fine, &fine.emitted);
+            self.take_means(&fine, &fine.shown);
             // Nothing is known of reflected light yet but that there is as much as a closed room has.
             let bounces = if self.solution.reflects() { 1.0 / (1.0 - self.reflectance) } else { 1.0 };
             self.mean *= bounces;

@@ -9,7 +9,7 @@ use std::collections::HashMap;
 use glam::DVec3;
 use rayon::prelude::*;
 use scene::Scene;
-use solver::Contact;
+use solver::{Contact, Cosine};
 
 use crate::{Leaf, Mesh};
 
@@ -25,16 +25,25 @@ pub struct SampleQuery {
     /// Where the value depends on the direction of approach, the unit direction in the polygon's plane that the limit is
     /// taken from: across a line of contact, to the middle of the triangle that asks at a corner of contact. Zero elsewhere.
     pub inward: DVec3,
+    /// By which normal: the polygon's own, of light that it passes on, or the shading normal, of light that is looked at. Only on
+    /// polygons with shading normals are these two questions.
+    pub cosine: Cosine,
 }
 
-/// Position and direction of approach of a query, to the bit, on its polygon: what its answer depends on.
-pub(crate) type QueryKey = (u32, [u64; 6]);
+/// Position and direction of approach of a query, to the bit, on its polygon, by a normal: what its answer depends on.
+pub(crate) type QueryKey = (u32, [u64; 6], Cosine);
 
 impl SampleQuery {
     pub(crate) fn key(&self) -> QueryKey {
         let [x, y, z] = self.position.to_array().map(f64::to_bits);
         let [u, v, w] = self.inward.to_array().map(f64::to_bits);
-        (self.polygon, [x, y, z, u, v, w])
+        (self.polygon, [x, y, z, u, v, w], self.cosine)
+    }
+
+    /// The same question about the light that is looked at.
+    pub(crate) fn looked_at(self, scene: &Scene) -> Self {
+        let cosine = if scene.has_shading_normals(self.polygon) { Cosine::Shading } else { Cosine::Own };
+        Self { cosine, ..self }
     }
 }
 
@@ -49,6 +58,14 @@ pub struct SampleTable {
     pub queries: Vec<SampleQuery>,
     /// By triangle, indices of r0 … r5 in the order of [`scene::SAMPLE_BARYCENTRICS`].
     pub triangles: Vec<[u32; 6]>,
+}
+
+impl SampleTable {
+    /// The samples on polygons with shading normals, and the question of each about the light that is looked at.
+    pub(crate) fn shaded(&self, scene: &Scene) -> (Vec<usize>, Vec<SampleQuery>) {
+        let looked_at = self.queries.iter().map(|query| query.looked_at(scene)).enumerate();
+        looked_at.filter(|(_, query)| query.cosine == Cosine::Shading).unzip()
+    }
 }
 
 /// A vertex, given twice, or the midpoint between two vertices, the smaller first.
@@ -67,7 +84,7 @@ enum Side {
     Of(u32),
 }
 
-/// Finds the samples of a mesh. `contact` says how other polygons touch a point of a polygon; it is asked only on
+/// Finds the samples of a mesh, all by polygons' own normals. `contact` says how other polygons touch a point of a polygon; it is asked only on
 /// borders of leaves, which is where contact can be.
 pub fn sample_table(
     scene: &Scene,
@@ -109,7 +126,7 @@ pub fn sample_table(
                 Contact::Corner => (Side::Of(id), inward),
             };
             *known.entry((polygon, station, side)).or_insert_with(|| {
-                table.queries.push(SampleQuery { position, polygon, element, inward });
+                table.queries.push(SampleQuery { position, polygon, element, inward, cosine: Cosine::Own });
                 table.queries.len() as u32 - 1
             })
         });

@@ -2,7 +2,7 @@
 
 use glam::{DVec2, DVec3};
 use scene::{Rgb, Scene};
-use solver::{Patch, Solution, Visibility};
+use solver::{Cosine, Patch, Solution, Visibility};
 
 use crate::{Leaf, Mesh, SampleQuery, SampleTable};
 
@@ -58,11 +58,12 @@ impl StandIns {
             stand_ins.first.push(stand_ins.shares.len());
             let around: Option<Vec<&LeafPlane>> = leaves.iter().map(|&leaf| planes[leaf as usize].as_ref()).collect();
             match around {
-                Some(around) => {
+                Some(around) if !around.is_empty() => {
                     let part = 1.0 / around.len() as f64;
                     around.into_iter().for_each(|plane| plane.share(query.position, part, &mut stand_ins.shares));
                 }
-                None => stand_ins.look_at(solution, query),
+                // What is looked at by shading normals is no leaf's to pass on: neighbours that are to look like one agree on it.
+                _ => stand_ins.look_at(solution, query),
             }
         }
         stand_ins.first.push(stand_ins.shares.len());
@@ -103,7 +104,7 @@ impl StandIns {
         let (centre, axes) = principal_axes(&leaf.outline, &solution.elements.patches[patch as usize])?;
         let first = self.queries.len() as u32;
         let Leaf { polygon, element, .. } = *leaf;
-        let query = |position| SampleQuery { position, polygon, element, inward: DVec3::ZERO };
+        let query = |position| SampleQuery { position, polygon, element, inward: DVec3::ZERO, cosine: Cosine::Own };
         self.queries.extend(axes.iter().flat_map(|&axis| [query(centre + axis), query(centre - axis)]));
         Some(LeafPlane { first, centre, axes })
     }

@@ -68,7 +68,8 @@ impl Emitters {
         into.total = 0.0;
         for (index, triangle) in (0..).zip(&self.triangles) {
             let in_front = surfaces.plane(triangle.polygon).distance(receiver.position) > surfaces.rounding;
-            let above = triangle.corners.iter().any(|&c| receiver.normal.dot(c - receiver.position) > 0.0);
+            let rises = |normal: DVec3| triangle.corners.iter().any(|&c| normal.dot(c - receiver.position) > 0.0);
+            let above = rises(receiver.normal) && rises(receiver.cosine);
             if !in_front || !above || surfaces.is_on(receiver, triangle.polygon) {
                 continue;
             }
@@ -88,7 +89,7 @@ impl Emitters {
         let Some(direction) = emitter.shape.sample(place, uv[1]) else { return Rgb::ZERO };
         let triangle = &self.triangles[emitter.triangle as usize];
         let plane = surfaces.plane(triangle.polygon);
-        let cosine = receiver.normal.dot(direction);
+        let cosine = receiver.cosine_to(direction);
         let distance = -plane.distance(receiver.position) / plane.normal.dot(direction);
         if cosine <= 0.0 || !distance.is_finite() || distance <= 0.0 {
             return Rgb::ZERO;

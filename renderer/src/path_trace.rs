@@ -4,6 +4,9 @@
 //! first term is estimated by sampling emitters, the second by following one such direction, at every bounce; so
 //! emission is never counted where a path happens to hit an emitter.
 //!
+//! At x, the point looked at, the cosine is to the shading normal of its polygon, if that has one, and nothing arrives from below
+//! the polygon's plane ([`Scene::shading_normal`]); at every y it is to the polygon's own normal.
+//!
 //! Samples come in independent batches. Within a batch the first directions and the first emitter samples are spread
 //! evenly; between batches nothing is shared, so their scatter measures the variance without any assumption on it.
 
@@ -52,7 +55,7 @@ impl Estimate {
     }
 }
 
-/// Irradiance at points given by position (metres) and front normal, W·m⁻².
+/// Irradiance at points given by position (metres) and front normal, W·m⁻²; by the shading normal of the polygon there, if any.
 ///
 /// A point within 1e-6 of the scene's size of a polygon whose front agrees with the normal is on that polygon; any
 /// other is in empty space. `bvh` is [`Bvh::of_scene`] of the same scene, which is valid ([`Scene::validate`]). The
@@ -69,7 +72,7 @@ pub fn irradiance(scene: &Scene, bvh: &Bvh, points: &[(DVec3, DVec3)], options: 
     points.par_iter().enumerate().map(estimate).collect()
 }
 
-/// Irradiance at points of surfaces, W·m⁻², each by as many paths as `samples` has for it, rounded up to a multiple of 32.
+/// Irradiance at points of surfaces, by their shading normals if any, W·m⁻², each by as many paths as `samples` has for it, rounded up to a multiple of 32.
 ///
 /// `bounces` and `seed` are those of [`PathOptions`]; `done` is called after every point, from any thread. `bvh` is
 /// [`Bvh::of_scene`] of the same scene. The result does not depend on the number of threads.
@@ -83,7 +86,11 @@ pub fn irradiance_on(
 ) -> Vec<Estimate> {
     let tracer = PathTracer::new(scene, bvh);
     let estimate = |(index, (&point, &samples)): (usize, (&SurfacePoint, &u32))| {
-        let estimate = tracer.irradiance(&point.into(), &PathOptions { samples, bounces, seed }, index as u64);
+        let estimate = tracer.irradiance(
+            &tracer.surfaces.looked_at(&point),
+            &PathOptions { samples, bounces, seed },
+            index as u64,
+        );
         done();
         estimate
     };
@@ -92,7 +99,7 @@ pub fn irradiance_on(
 
 /// A scene, ready for paths.
 pub(crate) struct PathTracer<'a> {
-    surfaces: Surfaces<'a>,
+    pub surfaces: Surfaces<'a>,
     emitters: Emitters,
 }
 
@@ -143,7 +150,11 @@ impl<'a> PathTracer<'a> {
         let mut numbers = first_bounce;
         for _ in 0..bounces {
             let [u, v, on_emitter @ ..] = numbers;
-            let direction = cosine_direction(receiver.normal, [u, v]);
+            let direction = cosine_direction(receiver.cosine, [u, v]);
+            // About a shading normal some look below the surface: they count nothing.
+            if receiver.cosine != receiver.normal && receiver.normal.dot(direction) <= 0.0 {
+                break;
+            }
             let Some(point) = self.surfaces.seen_from(&receiver, direction) else { break };
             throughput *= self.surfaces.scene.reflectance(point.polygon);
             receiver = point.into();

@@ -45,7 +45,7 @@ pub struct Reference {
     pub samples: u64,
 }
 
-/// Estimates direct and total irradiance at points.
+/// Estimates direct and total irradiance at points, by their shading normals if any.
 ///
 /// How many paths a point gets is decided by a pilot run whose own paths are thrown away, so that no estimate is
 /// biased by when it stopped. `bvh` is [`Bvh::of_scene`] of the same scene.
@@ -55,7 +55,7 @@ pub fn reference(scene: &Scene, bvh: &Bvh, points: &[SurfacePoint], options: &Re
         let estimate = |(index, (&point, &samples)): (usize, (&SurfacePoint, &u32))| {
             // Four passes a seed: no two of them, of any seed, draw the same numbers.
             let options = PathOptions { samples, bounces, seed: options.seed.wrapping_mul(4).wrapping_add(pass) };
-            tracer.irradiance(&point.into(), &options, index as u64)
+            tracer.irradiance(&tracer.surfaces.looked_at(&point), &options, index as u64)
         };
         points.par_iter().zip(samples).enumerate().map(estimate).collect()
     };

@@ -27,13 +27,24 @@ pub struct SurfacePoint {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Receiver {
     pub position: DVec3,
+    /// Only what is above the plane of this normal arrives.
     pub normal: DVec3,
+    /// The normal that the cosine is to: at the point looked at the shading normal, if it has one.
+    pub cosine: DVec3,
     pub polygon: Option<u32>,
 }
 
 impl From<SurfacePoint> for Receiver {
+    /// The point as one that passes light on.
     fn from(point: SurfacePoint) -> Self {
-        Self { position: point.position, normal: point.normal, polygon: Some(point.polygon) }
+        Self { position: point.position, normal: point.normal, cosine: point.normal, polygon: Some(point.polygon) }
+    }
+}
+
+impl Receiver {
+    /// The cosine by which light from a unit direction counts; 0 from below the plane, too.
+    pub fn cosine_to(&self, direction: DVec3) -> f64 {
+        if self.normal.dot(direction) > 0.0 { self.cosine.dot(direction).max(0.0) } else { 0.0 }
     }
 }
 
@@ -59,6 +70,12 @@ impl<'a> Surfaces<'a> {
         self.planes[polygon as usize]
     }
 
+    /// A point as one that is looked at.
+    pub fn looked_at(&self, point: &SurfacePoint) -> Receiver {
+        let cosine = self.scene.shading_normal(point.polygon, point.position).unwrap_or(point.normal);
+        Receiver { cosine, ..(*point).into() }
+    }
+
     /// Whether a receiver lies on a polygon or on the other side of it.
     pub fn is_on(&self, receiver: &Receiver, polygon: u32) -> bool {
         receiver.polygon.is_some_and(|own| self.is_same_surface(own, polygon))
@@ -74,16 +91,16 @@ impl<'a> Surfaces<'a> {
         self.bvh.is_blocked_among(receiver.position, target, between)
     }
 
-    /// The receiver at a given place: on the nearest polygon within [`REACH`] whose front agrees with the normal, in
+    /// The receiver that is looked at at a given place: on the nearest polygon within [`REACH`] whose front agrees with the normal, in
     /// its plane, or in empty space.
     pub fn receiver_at(&self, position: DVec3, normal: DVec3) -> Receiver {
         let normal = normal.normalize_or_zero();
         match self.bvh.nearest_surface(position, normal, REACH * self.scene.size()) {
-            None => Receiver { position, normal, polygon: None },
+            None => Receiver { position, normal, cosine: normal, polygon: None },
             Some(hit) => {
                 let plane = self.plane(hit.id);
                 let position = position - plane.normal * plane.distance(position);
-                Receiver { position, normal: plane.normal, polygon: Some(hit.id) }
+                self.looked_at(&SurfacePoint { position, normal: plane.normal, polygon: hit.id })
             }
         }
     }

@@ -15,7 +15,7 @@ pub struct Baked {
     pub scene: Scene,
     /// Positions of the mesh's vertices, metres; shared across polygons, so that no crack can open.
     pub vertices: Vec<Vec3>,
-    /// Irradiance samples, W·m⁻².
+    /// Irradiance samples, W·m⁻², by shading normals where the scene has them ([`Scene::shading_normal`]).
     pub samples: Vec<Vec3>,
     /// The triangles.
     pub triangles: Vec<BakedTriangle>,

@@ -15,6 +15,7 @@ mod polygon;
 mod ray;
 mod rgb;
 mod scene;
+mod shading;
 mod texture;
 mod texture_map;
 mod unfinished;

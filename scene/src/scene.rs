@@ -21,7 +21,7 @@ pub struct Scene {
     /// Texture coordinates (u, v) of the corners, beside [`Scene::corners`]; empty where no polygon has a texture.
     pub texture_coordinates: Vec<Vec2>,
     /// Shading normals of the corners, beside [`Scene::corners`]: unit vectors, or zero where the polygon's own normal
-    /// stands; empty where it stands everywhere.
+    /// stands; empty where it stands everywhere. See [`Scene::shading_normal`].
     pub shading_normals: Vec<Vec3>,
     /// The polygons.
     pub polygons: Vec<Polygon>,

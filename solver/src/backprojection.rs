@@ -14,7 +14,7 @@ use glam::DVec3;
 
 use crate::bounding_cone::BoundingCone;
 use crate::clip::{Position, clip_convex, locate};
-use crate::form_factor::point_form_factor;
+use crate::form_factor::{form_factor_at, point_form_factor};
 
 /// Distances from a cutting plane, as a fraction of the scene's size, that count as on it. Some roundings of f64
 /// above zero; larger would only drop thin fragments.
@@ -38,14 +38,52 @@ pub struct BlockerCone {
 pub struct Viewpoint {
     /// The point, metres.
     pub position: DVec3,
-    /// Unit normal of the receiver.
+    /// Unit normal of the receiver's plane: only what is above it is seen.
     pub up: DVec3,
+    /// Unit normal that the cosine of arriving light is to: `up`, or a shading normal, below whose horizon nothing counts either.
+    pub normal: DVec3,
     /// Direction in the receiver's plane: where something touches the point, the limit from point + ε·inward counts.
     /// Zero for a point that nothing touches.
     pub inward: DVec3,
+    /// What rises over the plane by no more than this, metres, is not met on any way from the point; minus infinity where all may be.
+    pub rise: f64,
 }
 
 impl Viewpoint {
+    /// A point of a flat surface, which is lit by its own normal.
+    pub fn flat(position: DVec3, up: DVec3, inward: DVec3) -> Self {
+        Self { position, up, normal: up, inward, rise: f64::NEG_INFINITY }
+    }
+
+    /// The length of a way from the point times its cosine, as arriving light is weighed; 0 below a horizon.
+    pub fn height(&self, way: DVec3) -> f64 {
+        if self.up.dot(way) > 0.0 { self.normal.dot(way).max(0.0) } else { 0.0 }
+    }
+
+    /// Whether a way from the point may meet an outline. A round body's faces all hang below the plane of each, though rays from a
+    /// common corner seem to meet them.
+    pub fn may_meet(&self, outline: &[DVec3]) -> bool {
+        outline.iter().any(|corner| self.up.dot(corner - self.position) > self.rise)
+    }
+
+    /// The point so many metres along its direction of approach.
+    pub fn aside(&self, distance: f64) -> Self {
+        Self { position: self.position + self.inward * distance, ..*self }
+    }
+
+    /// Form factor to a convex polygon if nothing hides it, 0..=1: clipped by both horizons, seen from either side.
+    pub fn form_factor(&self, outline: &[DVec3]) -> f64 {
+        if self.normal == self.up {
+            return form_factor_at(self.position, self.up, outline);
+        }
+        let corners: Vec<DVec3> = outline.iter().map(|corner| corner - self.position).collect();
+        let mut above = Vec::with_capacity(corners.len() + 1);
+        clip_convex(&corners, 0.0, |way| self.up.dot(way), &mut above);
+        let mut seen = Vec::with_capacity(above.len() + 1);
+        clip_convex(&above, 0.0, |way| self.normal.dot(way), &mut seen);
+        point_form_factor(&seen, self.normal)
+    }
+
     /// The cone of a polygon that touches the point within `tolerance` metres; empty if it is seen edge-on.
     pub fn tangent_cone(&self, outline: &[DVec3], normal: DVec3, tolerance: f64) -> Vec<DVec3> {
         if normal.dot(self.inward).abs() < 1e-9 {
@@ -116,16 +154,19 @@ impl Fragments {
         Self { tolerance: scene_size * PLANE_TOLERANCE, ..Self::default() }
     }
 
-    /// Starts over with the part of a source above the horizon of the point's `normal`. `corners` are relative to
-    /// the point.
-    pub fn start(&mut self, corners: &[DVec3], normal: DVec3) {
+    /// Starts over with the part of a source above the horizons of a point. `corners` are relative to the point.
+    pub fn start(&mut self, corners: &[DVec3], from: &Viewpoint) {
         self.points.clear();
         self.ranges.clear();
         self.factors.clear();
         self.bounds = None;
-        clip_convex(corners, self.tolerance, |d| normal.dot(d), &mut self.points);
-        if !self.points.is_empty() {
-            self.ranges.push(0..self.points.len());
+        clip_convex(corners, self.tolerance, |d| from.up.dot(d), &mut self.points);
+        let mut above = 0..self.points.len();
+        if from.normal != from.up {
+            above = self.clipped(above, from.normal);
+        }
+        if !above.is_empty() {
+            self.ranges.push(above);
         }
     }
 
@@ -268,11 +309,12 @@ mod tests {
         [(-1., -1.), (-1., 1.), (1., 1.), (1., -1.)].map(|(a, b)| DVec3::new(x + a * half, y + b * half, z)).to_vec()
     }
 
-    const FROM: Viewpoint = Viewpoint { position: DVec3::ZERO, up: DVec3::Z, inward: DVec3::X };
+    const FROM: Viewpoint =
+        Viewpoint { position: DVec3::ZERO, up: DVec3::Z, normal: DVec3::Z, inward: DVec3::X, rise: f64::NEG_INFINITY };
 
     fn visible(source: &[DVec3], blockers: &[Vec<DVec3>]) -> f64 {
         let mut fragments = Fragments::new(10.0);
-        fragments.start(source, DVec3::Z);
+        fragments.start(source, &FROM);
         for blocker in blockers {
             let normal = scene::area_vector(blocker).normalize_or_zero();
             if let Some(cone) = BlockerCone::of_polygon(blocker, normal, &FROM, 1e-9) {
@@ -342,10 +384,10 @@ mod tests {
             let from = Viewpoint { inward, ..FROM };
             let cone = BlockerCone::of_polygon(&wall, DVec3::X, &from, 1e-9).expect("the wall touches");
             let mut fragments = Fragments::new(4.0);
-            fragments.start(hidden, DVec3::Z);
+            fragments.start(hidden, &from);
             fragments.subtract(&cone);
             assert!(fragments.is_empty());
-            fragments.start(seen, DVec3::Z);
+            fragments.start(seen, &from);
             fragments.subtract(&cone);
             assert_eq!(fragments.measure(DVec3::Z), form_factor_at(DVec3::ZERO, DVec3::Z, seen));
         }
@@ -363,7 +405,7 @@ mod tests {
             let wall = corners.map(|(y, z)| DVec3::new(0.0, y, z)).to_vec();
             let cone = Viewpoint { inward, ..FROM }.tangent_cone(&wall, DVec3::X, 1e-9);
             let mut fragments = Fragments::new(4.0);
-            fragments.start(&cone, DVec3::Z);
+            fragments.start(&cone, &FROM);
             let limit = fragments.measure(DVec3::Z);
             let near = form_factor_at(inward * 1e-7, DVec3::Z, &wall);
             assert!((limit - near).abs() < 1e-6 && limit > 0.1, "{limit} {near}");

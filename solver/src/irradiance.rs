@@ -13,11 +13,12 @@ use std::sync::OnceLock;
 use glam::DVec3;
 use scene::{Rgb, Scene, luminance};
 
+use crate::backprojection::Viewpoint;
 use crate::clip::{Position, locate};
 use crate::emitter::{Emitter, emitter_tree, emitters};
 use crate::geometry::Geometry;
 use crate::leaf_gather::{LeafGather, SeenNode, Source};
-use crate::light_tree::LightTree;
+use crate::light_tree::{Horizon, LightTree};
 use crate::polygon_tree::PolygonTree;
 use crate::ray_gather::{RayGather, View, rays_for};
 use crate::shafts::Shafts;
@@ -32,6 +33,10 @@ const SOURCE_ERROR: f64 = 1e-3;
 /// What nodes may misplace where a bake is checked by other rays, as a part of what they may in the bake.
 const SMALLER: f64 = 0.25;
 
+/// What rises over the plane of a polygon with shading normals by no more than this fraction of the scene's size does not rise: in
+/// the six digits that files keep, the next faces of a round body seem to.
+const RISE: f64 = 1e-6;
+
 /// How other polygons touch a point of a polygon: how many values irradiance has there.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Contact {
@@ -44,6 +49,15 @@ pub enum Contact {
     },
     /// Contact ends or turns here: the value depends on the direction that the point is approached from.
     Corner,
+}
+
+/// Which normal the cosine of arriving light is to, on a polygon with shading normals ([`Scene::shading_normal`]).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Cosine {
+    /// The polygon's own: of light that it passes on.
+    Own,
+    /// The shading normal: of light that is looked at.
+    Shading,
 }
 
 /// Answers with the irradiance at points of a solved scene.
@@ -144,7 +158,8 @@ impl<'a> Gather<'a> {
 
     /// How other polygons touch a point of a polygon, on its front.
     pub fn contact(&self, polygon: u32, position: DVec3) -> Contact {
-        let up = self.geometry.plane(polygon).normal;
+        let from = self.viewpoint(polygon, position, DVec3::ZERO, Cosine::Own);
+        let up = from.up;
         let mut line: Option<DVec3> = None;
         for other in self.tree.near(position, self.geometry.contact_tolerance) {
             let plane = self.geometry.plane(other);
@@ -153,6 +168,9 @@ impl<'a> Gather<'a> {
                 continue;
             }
             let outline = self.geometry.outline(other);
+            if !from.may_meet(outline) {
+                continue;
+            }
             let direction = match locate(outline, plane.normal, position, self.geometry.contact_tolerance) {
                 Position::Outside => continue,
                 Position::Interior => across.normalize(),
@@ -189,6 +207,25 @@ impl<'a> Gather<'a> {
         line.map_or(Contact::None, |direction| Contact::Line { direction })
     }
 
+    /// A point of a polygon as light arrives there; `inward` as [`Viewpoint`] has it.
+    pub(crate) fn viewpoint(&self, polygon: u32, position: DVec3, inward: DVec3, cosine: Cosine) -> Viewpoint {
+        let up = self.geometry.plane(polygon).normal;
+        let flat = Viewpoint::flat(position, up, inward);
+        if !self.scene.has_shading_normals(polygon) {
+            return flat;
+        }
+        let normal = match cosine {
+            Cosine::Own => up,
+            Cosine::Shading => self.scene.shading_normal(polygon, position).unwrap_or(up),
+        };
+        Viewpoint { normal, rise: RISE * self.geometry.size, ..flat }
+    }
+
+    /// What bounds the light on a polygon.
+    pub(crate) fn horizon(&self, polygon: u32) -> Horizon {
+        Horizon { plane: self.geometry.plane(polygon), tilt: self.scene.shading_tilt(polygon) }
+    }
+
     /// A gather for the points in the closure of one element.
     pub fn over(&'a self, element: NodeId) -> LeafGather<'a> {
         match self.emitter_tree {
@@ -206,8 +243,7 @@ impl<'a> Gather<'a> {
             Some(_) => {
                 let elements = &self.solution.elements;
                 let polygon = elements.polygon_of(element).unwrap_or_default();
-                let plane = self.geometry.plane(polygon);
-                let view = |rays: &RayGather| rays.over(self.solution, element, &plane);
+                let view = |rays: &RayGather| rays.over(self.solution, element, &self.horizon(polygon));
                 LeafGather {
                     gather: self,
                     polygon,
@@ -334,7 +370,7 @@ impl<'a> Gather<'a> {
         }
     }
 
-    /// Irradiance at a position in the plane of a polygon, W·m⁻²; `inward` is the direction in the plane from whose
+    /// Irradiance at a position in the plane of a polygon, by its shading normal if it has one, W·m⁻²; `inward` is the direction in the plane from whose
     /// side the limit is taken where other polygons touch the position. Finds the leaf by itself: for single points.
     pub fn irradiance_at(&self, polygon: u32, position: DVec3, inward: DVec3) -> Rgb {
         match self.leaf_under(polygon, position, DVec3::ZERO, inward) {
@@ -389,3 +425,6 @@ impl<'a> Gather<'a> {
         None
     }
 }
+
+#[cfg(test)]
+mod tests;

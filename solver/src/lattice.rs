@@ -4,6 +4,8 @@ use std::f64::consts::TAU;
 
 use glam::{DVec2, DVec3};
 
+use crate::backprojection::Viewpoint;
+
 /// The powers of the plastic number, whose multiples fill the square evenly (Roberts 2018).
 pub(crate) const STEP: DVec2 = DVec2::new(0.754_877_666_246_692_8, 0.569_840_290_998_053_3);
 
@@ -49,20 +51,19 @@ impl<'a> Fan<'a> {
         origin + (a - origin) * s + (b - origin) * t
     }
 
-    /// Tries so many places: what of all that they send to a position with the normal `up` is not blocked. To stop early where
+    /// Tries so many places: what of all that they send to a point is not blocked. To stop early where
     /// the first few agree would take what is mostly seen for seen wholly.
     pub fn arriving(
         &self,
-        position: DVec3,
-        up: DVec3,
+        from: &Viewpoint,
         (shift, rays): (DVec2, u32),
         is_blocked: impl Fn(DVec3) -> bool,
     ) -> Arriving {
         let (mut arrives, mut all, mut middle) = (0.0, 0.0, DVec3::ZERO);
         for place in (0..rays).map(|i| self.place(shift, i)) {
-            let way = place - position;
+            let way = place - from.position;
             let square = way.length_squared();
-            let weight = up.dot(way).max(0.0) * self.normal.dot(way).abs() / (square * square).max(f64::MIN_POSITIVE);
+            let weight = from.height(way) * self.normal.dot(way).abs() / (square * square).max(f64::MIN_POSITIVE);
             if weight > 0.0 {
                 all += weight;
                 if !is_blocked(place) {
@@ -133,7 +134,8 @@ mod tests {
         let outline = [(-1.0, -1.0), (-1.0, 1.0), (1.0, 1.0), (1.0, -1.0)].map(|(x, y)| DVec3::new(x, y, 2.0));
         let fan = Fan::new(&outline);
         let seen = |up, is_blocked: &dyn Fn(DVec3) -> bool| {
-            fan.arriving(DVec3::ZERO, up, (shift(DVec3::ONE, 3), 400), is_blocked)
+            let from = Viewpoint::flat(DVec3::ZERO, up, DVec3::ZERO);
+            fan.arriving(&from, (shift(DVec3::ONE, 3), 400), is_blocked)
         };
         let half = seen(DVec3::Z, &|place| place.x > 0.0);
         assert!((half.share - 0.5).abs() < 0.02 && half.middle.x < -0.3 && half.middle.y.abs() < 0.05, "{half:?}");

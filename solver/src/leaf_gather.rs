@@ -18,9 +18,9 @@ use crate::backprojection::{BlockerCone, Fragments, SLIVER, Viewpoint};
 use crate::blocker::Blocker;
 use crate::clip::clip_convex;
 use crate::emitter::outline_of;
-use crate::form_factor::{form_factor_at, point_form_factor};
+use crate::form_factor::point_form_factor;
 use crate::ray_gather::View;
-use crate::{Gather, NodeId};
+use crate::{Cosine, Gather, NodeId};
 
 /// The part of a source's form factor from which on nothing is taken to hide it: above the rounding of its clipping.
 const WHOLE: f64 = 1.0 - 1e-9;
@@ -119,33 +119,34 @@ enum Light {
 }
 
 impl LeafGather<'_> {
-    /// Irradiance at a position of the leaf, W·m⁻². `inward` is a direction in the leaf's plane: where other polygons
+    /// Irradiance at a position of the leaf, by the shading normal if it has one, W·m⁻². `inward` is a direction in the leaf's plane: where other polygons
     /// touch the position, the limit is taken from that side; elsewhere it has no influence.
     pub fn irradiance(&self, position: DVec3, inward: DVec3) -> Rgb {
         let mut seen = Vec::new();
         let emitted = match self.gather.rays() {
-            None => self.look(position, inward, Light::Both, &mut seen),
+            None => self.look(position, inward, (Light::Both, Cosine::Shading), &mut seen),
             Some(_) => {
-                self.seen_nodes(position, inward, &mut seen);
-                self.emitted(position, inward)
+                self.seen_nodes(position, inward, Cosine::Shading, &mut seen);
+                self.emitted(position, inward, Cosine::Shading)
             }
         };
         emitted + self.gather.irradiance_from(&seen)
     }
 
     /// The part of the irradiance that comes straight from emitters, W·m⁻²: exact.
-    pub fn emitted(&self, position: DVec3, inward: DVec3) -> Rgb {
-        self.look(position, inward, Light::Emitted, &mut Vec::new())
+    pub fn emitted(&self, position: DVec3, inward: DVec3, cosine: Cosine) -> Rgb {
+        self.look(position, inward, (Light::Emitted, cosine), &mut Vec::new())
     }
 
     /// Appends the nodes of reflectors that a position sees. Nodes are opened as far as the light of the solution asks for.
-    pub fn seen_nodes(&self, position: DVec3, inward: DVec3, seen: &mut Vec<SeenNode>) {
+    pub fn seen_nodes(&self, position: DVec3, inward: DVec3, cosine: Cosine, seen: &mut Vec<SeenNode>) {
         match self.gather.rays() {
             None => {
-                self.look(position, inward, Light::Reflected, seen);
+                self.look(position, inward, (Light::Reflected, cosine), seen);
             }
             Some(rays) => {
-                rays.seen_nodes(self.gather.solution, &self.view, position, inward, seen);
+                let from = self.gather.viewpoint(self.polygon, position, inward, cosine);
+                rays.seen_nodes(self.gather.solution, &self.view, &from, seen);
             }
         }
     }
@@ -194,12 +195,12 @@ impl LeafGather<'_> {
         let emitter = &emitters[body as usize];
         let Some(cone) = outline_of(&emitter.body, from.position) else {
             let faces = emitter.polygons.iter().filter(|&&face| geometry.plane(face).distance(from.position) > 0.0);
-            return faces.map(|&face| form_factor_at(from.position, from.up, geometry.outline(face))).sum();
+            return faces.map(|&face| from.form_factor(geometry.outline(face))).sum();
         };
-        fragments.start(cone.corners(), from.up);
+        fragments.start(cone.corners(), from);
         let obstacles = source.before.get_or_init(|| self.before(source));
         if source.blockers.is_none() || obstacles.len() > MOST_OBSTACLES {
-            let unoccluded = fragments.measure(from.up);
+            let unoccluded = fragments.measure(from.normal);
             let distance = emitter.body[0].distance(from.position);
             let outline: Vec<DVec3> = cone.corners().iter().map(|corner| from.position + corner * distance).collect();
             let passes = |polygon: u32| emitter.polygons.binary_search(&polygon).is_ok();
@@ -212,7 +213,7 @@ impl LeafGather<'_> {
             }
             self.subtract(obstacle, from, cones, fragments);
         }
-        fragments.measure(from.up)
+        fragments.measure(from.normal)
     }
 
     /// Cuts away what an obstacle hides from a point. `cones` are those that the point has needed so far, by number.
@@ -244,10 +245,10 @@ impl LeafGather<'_> {
     }
 
     /// Irradiance from emitters, and the nodes of reflectors that are seen.
-    fn look(&self, position: DVec3, inward: DVec3, wanted: Light, seen: &mut Vec<SeenNode>) -> Rgb {
+    fn look(&self, position: DVec3, inward: DVec3, (wanted, cosine): (Light, Cosine), seen: &mut Vec<SeenNode>) -> Rgb {
         let gather = self.gather;
-        let up = gather.geometry.plane(self.polygon).normal;
-        let from = Viewpoint { position, up, inward: inward.reject_from_normalized(up).normalize_or_zero() };
+        let mut from = gather.viewpoint(self.polygon, position, inward, cosine);
+        from.inward = inward.reject_from_normalized(from.up).normalize_or_zero();
         let mut cones = Cones { of_solids: HashMap::new(), of_faces: vec![None; self.blockers.len()] };
         let mut fragments = Fragments::new(gather.geometry.size);
         let mut total = Rgb::ZERO;
@@ -268,8 +269,7 @@ impl LeafGather<'_> {
             let plane = gather.geometry.planes[source.polygon as usize];
             let depth = plane.distance(position);
             let touches = depth.abs() <= gather.geometry.contact_tolerance;
-            let unoccluded =
-                if reflects && depth > 0.0 && !touches { form_factor_at(position, up, outline) } else { 0.0 };
+            let unoccluded = if reflects && depth > 0.0 && !touches { from.form_factor(outline) } else { 0.0 };
             if !emits && !touches && gather.is_dim(source.polygon, unoccluded) {
                 self.see_dim(source, unoccluded, seen);
                 continue;
@@ -278,17 +278,17 @@ impl LeafGather<'_> {
                 if plane.normal.dot(from.inward) <= 0.0 {
                     continue;
                 }
-                fragments.start(&from.tangent_cone(outline, plane.normal, gather.geometry.contact_tolerance), up);
+                fragments.start(&from.tangent_cone(outline, plane.normal, gather.geometry.contact_tolerance), &from);
             } else if depth > 0.0 {
                 let corners: Vec<DVec3> = outline.iter().map(|corner| corner - position).collect();
-                fragments.start(&corners, up);
+                fragments.start(&corners, &from);
             } else {
                 continue;
             }
             let obstacles = source.before.get_or_init(|| self.before(source));
             let by_rays = source.blockers.is_none();
             if (by_rays || !obstacles.is_empty()) && !touches && gather.emitter_tree().is_some() {
-                let unoccluded = fragments.measure(up);
+                let unoccluded = fragments.measure(from.normal);
                 let irradiance = luminance(unoccluded * material.exitance());
                 if by_rays || irradiance <= gather.budget() || obstacles.len() > MOST_OBSTACLES {
                     let share = self.seen_share(outline, irradiance, &from, |polygon| polygon == source.polygon);
@@ -302,7 +302,7 @@ impl LeafGather<'_> {
                 }
                 self.subtract(obstacle, &from, &mut cones, &mut fragments);
             }
-            let form_factor = fragments.measure(up);
+            let form_factor = fragments.measure(from.normal);
             if emits {
                 total += form_factor * material.exitance();
             }
@@ -344,7 +344,7 @@ impl LeafGather<'_> {
     fn see_whole(&self, source: &Source, from: &Viewpoint, seen: &mut Vec<SeenNode>) {
         for &(root, _) in &source.roots {
             let outline = self.gather.solution.elements.outline(root);
-            self.open_whole(root, form_factor_at(from.position, from.up, outline), from, seen);
+            self.open_whole(root, from.form_factor(outline), from, seen);
         }
     }
 
@@ -365,7 +365,7 @@ impl LeafGather<'_> {
             return;
         }
         for child in elements.children(node) {
-            self.open_whole(child, form_factor_at(from.position, from.up, elements.outline(child)), from, seen);
+            self.open_whole(child, from.form_factor(elements.outline(child)), from, seen);
         }
     }
 
@@ -379,7 +379,7 @@ impl LeafGather<'_> {
             for &(root, _) in &source.roots {
                 let part = self.clip_to_outline(fragment, root, from);
                 if !part.is_empty() {
-                    self.open(root, &part, point_form_factor(&part, from.up), from, seen);
+                    self.open(root, &part, point_form_factor(&part, from.normal), from, seen);
                 }
             }
         }
@@ -400,7 +400,7 @@ impl LeafGather<'_> {
         for child in elements.children(node) {
             let part = self.clip_to_cell(fragment, node, child, from);
             if !part.is_empty() {
-                self.open(child, &part, point_form_factor(&part, from.up), from, seen);
+                self.open(child, &part, point_form_factor(&part, from.normal), from, seen);
             }
         }
     }
@@ -426,8 +426,7 @@ impl LeafGather<'_> {
                 for [p, q, r] in [[a, b, b], [b, a, b], [b, b, a]] {
                     let place = centre * p + corner * q + next * r;
                     let square = place.length_squared();
-                    let weight =
-                        share * area * from.up.dot(place).max(0.0) * normal.dot(place).abs() / (square * square);
+                    let weight = share * area * from.height(place) * normal.dot(place).abs() / (square * square);
                     weighted += place * weight;
                     total += weight;
                 }

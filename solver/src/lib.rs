@@ -37,7 +37,7 @@ mod visibility;
 pub use cut::{contact_lines, cut_polygon};
 pub use element::{Elements, Node, NodeId, NodeKind, Patch};
 pub use form_factor::{exchange, form_factor, form_factor_at, point_form_factor};
-pub use irradiance::{Contact, Gather};
+pub use irradiance::{Contact, Cosine, Gather};
 pub use lattice::{Fan, hemisphere, spread};
 pub use leaf_gather::{LeafGather, SeenNode};
 pub use shafts::Shafts;

@@ -4,7 +4,7 @@
 //! A hall has lamps by the thousand, of which a point sees a dozen well. What decides which is a bound, not a guess: no point of
 //! an element has more light from a group than that.
 
-use std::f64::consts::PI;
+use std::f64::consts::{FRAC_PI_2, PI};
 
 use glam::DVec3;
 use scene::Plane;
@@ -54,6 +54,13 @@ enum Parts {
     /// Number of the light.
     Light(u32),
     Groups([u32; 2]),
+}
+
+/// What bounds the light on an element: the plane that it is received above, and how far from its normal the cosine may be taken
+/// to, radians ([`scene::Scene::shading_tilt`]).
+pub struct Horizon {
+    pub plane: Plane,
+    pub tilt: f64,
 }
 
 /// The lights as an element sees them.
@@ -106,13 +113,13 @@ impl LightTree {
         index
     }
 
-    /// What an element, given by its outline and plane, sees of the lights. A group is faint if it sends no more than
+    /// What an element, given by its outline and horizon, sees of the lights. A group is faint if it sends no more than
     /// `faint`, luminance, W·m⁻², to any point of the element; what is behind the element, or looks away, is in neither list.
-    pub fn cut(&self, outline: &[DVec3], plane: &Plane, faint: f64) -> LightCut {
+    pub fn cut(&self, outline: &[DVec3], horizon: &Horizon, faint: f64) -> LightCut {
         let mut cut = LightCut::default();
         let mut open: Vec<u32> = if self.nodes.is_empty() { Vec::new() } else { vec![0] };
         while let Some(index) = open.pop() {
-            let most = self.most(index, outline, plane);
+            let most = self.most(index, outline, horizon);
             match self.nodes[index as usize].parts {
                 _ if most == 0.0 => {}
                 _ if most <= faint => cut.groups.push(index),
@@ -125,7 +132,7 @@ impl LightTree {
     }
 
     /// The most light, luminance, W·m⁻², that any point of an element has from a group, whatever stands between.
-    fn most(&self, index: u32, outline: &[DVec3], plane: &Plane) -> f64 {
+    fn most(&self, index: u32, outline: &[DVec3], Horizon { plane, tilt }: &Horizon) -> f64 {
         let group = &self.nodes[index as usize];
         let height = plane.distance(DVec3::select(plane.normal.cmpgt(DVec3::ZERO), group.high, group.low));
         let reach = group.axis.map_or(f64::INFINITY, |axis| {
@@ -137,7 +144,11 @@ impl LightTree {
         }
         let (low, high) = bounds(outline);
         let square = (group.low - high).max(low - group.high).max(DVec3::ZERO).length_squared();
-        let cosines = (height / square.sqrt()).min(1.0) * (reach / square.sqrt()).min(1.0);
+        let mut cosine = (height / square.sqrt()).min(1.0);
+        if *tilt > 0.0 {
+            cosine = (cosine.asin() + tilt).min(FRAC_PI_2).sin();
+        }
+        let cosines = cosine * (reach / square.sqrt()).min(1.0);
         self.power(index) * cosines / (PI * square)
     }
 
@@ -175,6 +186,10 @@ mod tests {
         [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)].map(|(u, v)| DVec3::new(x + side * u, y + side * v, z))
     }
 
+    fn flat(outline: &[DVec3]) -> Horizon {
+        Horizon { plane: Plane::through(outline), tilt: 0.0 }
+    }
+
     /// A hundred lamps under a ceiling at height 3, facing down, of unit radiosity.
     fn hall() -> (Vec<[DVec3; 4]>, LightTree) {
         let outlines: Vec<_> =
@@ -187,17 +202,17 @@ mod tests {
     #[test]
     fn nothing_has_no_cut() {
         let outline = square(0.0, 0.0, 0.0, 1.0);
-        assert_eq!(LightTree::new(&[]).cut(&outline, &Plane::through(&outline), 1.0), LightCut::default());
+        assert_eq!(LightTree::new(&[]).cut(&outline, &flat(&outline), 1.0), LightCut::default());
     }
 
     #[test]
     fn every_lamp_is_in_one_list_and_groups_keep_the_bound() {
         let (outlines, tree) = hall();
         let floor = square(17.0, 9.0, 0.0, 1.0);
-        let plane = Plane::through(&floor);
+        let horizon = flat(&floor);
         let mut singles = Vec::new();
         for faint in [0.0, 5e-4, 5e-3] {
-            let cut = tree.cut(&floor, &plane, faint);
+            let cut = tree.cut(&floor, &horizon, faint);
             let mut all = cut.single.clone();
             for &group in &cut.groups {
                 let Group { first, end, .. } = tree.nodes[group as usize];
@@ -216,6 +231,28 @@ mod tests {
         assert!(singles[0] == 100 && singles[1] > singles[2] && singles[2] > 0, "{singles:?}");
     }
 
+    /// A wall sees lamps at a grazing angle: turned towards them by a shading normal it has more light.
+    #[test]
+    fn the_bound_holds_for_shading_normals() {
+        let (outlines, tree) = hall();
+        let wall = [(9.0, 0.0), (10.0, 0.0), (10.0, 1.0), (9.0, 1.0)].map(|(y, z)| DVec3::new(19.9, y, z));
+        let tilt = 0.5_f64;
+        let horizon = Horizon { plane: Plane::through(&wall), tilt };
+        let normal = horizon.plane.normal * tilt.cos() + DVec3::Z * tilt.sin();
+        let mut beyond_its_own = 0;
+        for index in 0..tree.nodes.len() as u32 {
+            let Parts::Light(lamp) = tree.nodes[index as usize].parts else { continue };
+            let outline = &outlines[lamp as usize];
+            if outline.iter().any(|corner| horizon.plane.distance(*corner) < 0.0) {
+                continue;
+            }
+            let lit = wall.map(|corner| form_factor_at(corner, normal, outline)).into_iter().fold(0.0, f64::max);
+            assert!(lit <= tree.most(index, &wall, &horizon) + 1e-15);
+            beyond_its_own += usize::from(lit > tree.most(index, &wall, &flat(&wall)));
+        }
+        assert!(beyond_its_own > 0);
+    }
+
     #[test]
     fn what_looks_away_or_is_behind_is_in_no_list() {
         let (_, tree) = hall();
@@ -223,7 +260,7 @@ mod tests {
         faces_down.reverse();
         let above = square(17.0, 9.0, 3.5, 1.0);
         for outline in [faces_down, above] {
-            assert_eq!(tree.cut(&outline, &Plane::through(&outline), 0.0), LightCut::default());
+            assert_eq!(tree.cut(&outline, &flat(&outline), 0.0), LightCut::default());
         }
     }
 

@@ -7,12 +7,12 @@
 //! should. What it costs grows with the logarithm of the number of polygons.
 
 use glam::{DVec2, DVec3};
-use scene::{Bvh, Plane, Ray, Scene, luminance, other_sides};
+use scene::{Bvh, Ray, Scene, luminance, other_sides};
 
-use crate::form_factor::form_factor_at;
+use crate::backprojection::Viewpoint;
 use crate::lattice::{Arriving, Fan, STEP, hemisphere, shift};
 use crate::leaf_gather::SeenNode;
-use crate::light_tree::{Light, LightTree};
+use crate::light_tree::{Horizon, Light, LightTree};
 use crate::{NodeId, Patch, Solution};
 
 /// Rays from a point for a source error of `RAYS_ERROR`. What rays that are spread evenly miss falls with their number to the
@@ -57,11 +57,10 @@ pub(crate) struct View {
     negligible: f64,
 }
 
-/// Where rays start: a position just in front of all that touches it.
+/// Where rays start: a point just in front of all that touches it.
 struct Origin<'a> {
     view: &'a View,
-    position: DVec3,
-    normal: DVec3,
+    point: Viewpoint,
     /// Of the lattices that rays from here are spread by.
     shift: DVec2,
 }
@@ -124,13 +123,13 @@ impl RayGather {
         }
     }
 
-    /// How the points of an element, which lies in a plane, look at reflectors.
-    pub fn over(&self, solution: &Solution, element: NodeId, plane: &Plane) -> View {
+    /// How the points of an element look at reflectors.
+    pub fn over(&self, solution: &Solution, element: NodeId, horizon: &Horizon) -> View {
         let elements = &solution.elements;
         let rays = self.rays_over(solution, element);
         // What is not looked at is met by rays, which scatter the more the fewer they are.
         let negligible = NEGLIGIBLE * self.budget * scatter_of(rays) / scatter_of(self.rays);
-        let cut = self.tree.cut(elements.outline(element), plane, negligible);
+        let cut = self.tree.cut(elements.outline(element), horizon, negligible);
         let prominent = cut.single.iter().map(|&number| self.roots[number as usize]).collect();
         View { polygon: elements.polygon_of(element).unwrap_or_default(), rays, prominent, negligible }
     }
@@ -140,22 +139,9 @@ impl RayGather {
         ((f64::from(self.rays) * part.clamp(FEW_RAYS, 1.0)) as u32).max(1)
     }
 
-    /// Appends the nodes of reflectors that a position sees; ascending, each once. `inward` is the
-    /// direction in the plane that a position is approached from where other polygons touch it; zero elsewhere.
-    pub fn seen_nodes(
-        &self,
-        solution: &Solution,
-        view: &View,
-        position: DVec3,
-        inward: DVec3,
-        seen: &mut Vec<SeenNode>,
-    ) {
-        let from = Origin {
-            view,
-            position: position + inward * (ASIDE * self.size),
-            normal: self.normals[view.polygon as usize],
-            shift: shift(position, self.turn),
-        };
+    /// Appends the nodes of reflectors that a point sees; ascending, each once.
+    pub fn seen_nodes(&self, solution: &Solution, view: &View, point: &Viewpoint, seen: &mut Vec<SeenNode>) {
+        let from = Origin { view, point: point.aside(ASIDE * self.size), shift: shift(point.position, self.turn) };
         let first = seen.len();
         let looked_at: Vec<NodeId> =
             view.prominent.iter().copied().filter(|&root| self.look_at(solution, root, &from, seen)).collect();
@@ -171,10 +157,10 @@ impl RayGather {
             return false;
         }
         let outline = elements.outline(root);
-        if self.normals[polygon as usize].dot(from.position - outline[0]) <= self.size * ASIDE {
+        if self.normals[polygon as usize].dot(from.point.position - outline[0]) <= self.size * ASIDE {
             return false;
         }
-        let form_factor = form_factor_at(from.position, from.normal, outline);
+        let form_factor = from.point.form_factor(outline);
         let radiosity = self.reflectances[polygon as usize] * luminance(solution.light[root as usize].irradiance);
         if form_factor * radiosity <= from.view.negligible {
             return false;
@@ -195,7 +181,7 @@ impl RayGather {
         let misplaced = self.reflectances[polygon as usize] * light.deviation * form_factor;
         if record.child_count > 0 && misplaced > self.budget {
             for child in elements.children(node) {
-                let part = form_factor_at(from.position, from.normal, elements.outline(child));
+                let part = from.point.form_factor(elements.outline(child));
                 self.open(solution, child, part, from, seen);
             }
             return;
@@ -206,14 +192,15 @@ impl RayGather {
         let rays = AIMED_RAYS[usize::from(is_bright)].max((form_factor * f64::from(from.view.rays)) as u32);
         let is_blocked = |place: DVec3| {
             let hides = |triangle: u32| {
-                let met = elements.patches[self.patches[triangle as usize] as usize].polygon;
-                !self.is_own(from.view.polygon, met) && !self.is_own(polygon, met)
+                let Patch { polygon: met, root, .. } = elements.patches[self.patches[triangle as usize] as usize];
+                !self.is_own(from.view.polygon, met)
+                    && !self.is_own(polygon, met)
+                    && from.point.may_meet(elements.outline(root))
             };
-            self.bvh.is_blocked_among(from.position, place, hides)
+            self.bvh.is_blocked_among(from.point.position, place, hides)
         };
         let shift = from.shift + DVec2::splat(f64::from(node) * STEP.x);
-        let Arriving { share, middle } =
-            Fan::new(outline).arriving(from.position, from.normal, (shift, rays), is_blocked);
+        let Arriving { share, middle } = Fan::new(outline).arriving(&from.point, (shift, rays), is_blocked);
         if share > 0.0 {
             let offset = elements.patches[patch as usize].along(middle - record.centre);
             seen.push(SeenNode { node, form_factor: form_factor * share, offset });
@@ -225,13 +212,16 @@ impl RayGather {
         let elements = &solution.elements;
         let rays = from.view.rays;
         let share = 1.0 / f64::from(rays);
-        for direction in hemisphere(from.normal, rays, from.shift) {
+        let Viewpoint { position, up, normal, .. } = from.point;
+        // About a shading normal some look below the polygon's plane, where nothing is seen.
+        for direction in hemisphere(normal, rays, from.shift).filter(|way| normal == up || up.dot(*way) > 0.0) {
             let meets = |triangle: u32| {
-                let met = elements.patches[self.patches[triangle as usize] as usize].polygon;
+                let Patch { polygon: met, root, .. } = elements.patches[self.patches[triangle as usize] as usize];
                 !self.is_own(from.view.polygon, met)
+                    && from.point.may_meet(elements.outline(root))
                     && (self.other_sides[met as usize].is_none() || self.normals[met as usize].dot(direction) < 0.0)
             };
-            let ray = Ray { origin: from.position, direction };
+            let ray = Ray { origin: position, direction };
             let Some(hit) = self.bvh.closest_hit_among(&ray, meets) else { continue };
             if hit.normal.dot(direction) >= 0.0 {
                 continue; // A back, which is black.
@@ -240,7 +230,7 @@ impl RayGather {
             if looked_at.binary_search(&frame.root).is_ok() {
                 continue;
             }
-            let place = from.position + direction * hit.distance;
+            let place = position + direction * hit.distance;
             let node = self.standing_for(solution, frame, place);
             let offset = frame.along(place - elements.nodes[node as usize].centre);
             seen.push(SeenNode { node, form_factor: share, offset });
@@ -352,9 +342,19 @@ mod tests {
             gather.seen_nodes(&solution, &view, position, DVec3::ZERO, &mut seen);
             let sum: f64 = seen.iter().map(|seen| seen.form_factor).sum();
             sums.push(sum - 1.0);
+            // About a shading normal the part below the plane is missing: (1 + cos θ)/2 is left.
+            let (sin, cos) = (0.1 * f64::from(i % 13)).sin_cos();
+            let (y, x) = f64::from(i).sin_cos();
+            let turned = Viewpoint { normal: DVec3::new(sin * x, sin * y, cos), ..point };
+            seen.clear();
+            gather.seen_nodes(&solution, &prominent, 4, &turned, &mut seen);
+            let sum: f64 = seen.iter().map(|seen| seen.form_factor).sum();
+            turned_sums.push(sum - (1.0 + cos) / 2.0);
         }
-        let mean = sums.iter().sum::<f64>() / 40.0;
-        let square = (sums.iter().map(|x| x * x).sum::<f64>() / 40.0).sqrt();
-        assert!(mean.abs() < 0.01 && square < 0.05, "{mean} {square}");
+        for sums in [sums, turned_sums] {
+            let mean = sums.iter().sum::<f64>() / 40.0;
+            let square = (sums.iter().map(|x| x * x).sum::<f64>() / 40.0).sqrt();
+            assert!(mean.abs() < 0.01 && square < 0.05, "{mean} {square}");
+        }
     }
 }

@@ -243,9 +243,9 @@ impl Network {
         if blockers.is_empty() || unoccluded == 0.0 {
             return unoccluded;
         }
-        let from = Viewpoint { position, up, inward: DVec3::ZERO };
+        let from = Viewpoint::flat(position, up, DVec3::ZERO);
         let corners: Vec<DVec3> = outline.iter().map(|corner| corner - position).collect();
-        fragments.start(&corners, up);
+        fragments.start(&corners, &from);
         for blocker in blockers {
             if fragments.is_empty() {
                 return 0.0;

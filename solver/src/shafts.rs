@@ -51,10 +51,13 @@ impl<'a> Gather<'a> {
     pub(crate) fn over_shafts(&'a self, element: NodeId, shafts: &mut Shafts) -> LeafGather<'a> {
         let elements = &self.solution.elements;
         let polygon = elements.polygon_of(element).unwrap_or_default();
-        let (outline, plane) = (elements.outline(element), self.geometry.plane(polygon));
+        let (outline, horizon) = (elements.outline(element), self.horizon(polygon));
+        let plane = horizon.plane;
         let centre = elements.nodes[element as usize].centre;
-        let cut =
-            self.emitter_tree().map(|tree| tree.cut(outline, &plane, FAINT_GROUP * self.budget())).unwrap_or_default();
+        let cut = self
+            .emitter_tree()
+            .map(|tree| tree.cut(outline, &horizon, FAINT_GROUP * self.budget()))
+            .unwrap_or_default();
         let mut sources = Vec::new();
         for number in cut.single {
             let emitter = &self.emitters[number as usize];

@@ -201,11 +201,11 @@ mod tests {
                 (0.5, 1.0, 0.1),
             ] {
                 let position = DVec3::new(x, y, z);
-                let from = Viewpoint { position, up: DVec3::Z, inward: DVec3::ZERO };
+                let from = Viewpoint::flat(position, DVec3::Z, DVec3::ZERO);
                 let seen = |cones: &[BlockerCone]| {
                     let mut fragments = Fragments::new(10.0);
                     let corners: Vec<DVec3> = source.iter().map(|corner| corner - position).collect();
-                    fragments.start(&corners, DVec3::Z);
+                    fragments.start(&corners, &from);
                     cones.iter().for_each(|cone| fragments.subtract(cone));
                     fragments.measure(DVec3::Z)
                 };
@@ -223,7 +223,7 @@ mod tests {
                 }
             }
             for inside in [DVec3::new(0.1, 0.0, 0.2), DVec3::new(0.1, 0.0, 0.0), DVec3::new(0.5, 0.2, 0.1)] {
-                let from = Viewpoint { position: inside, up: DVec3::Z, inward: DVec3::ZERO };
+                let from = Viewpoint::flat(inside, DVec3::Z, DVec3::ZERO);
                 assert!(solids.cone(&scene, &geometry, 0, &from).is_none(), "{inside}");
             }
         }

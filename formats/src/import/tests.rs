@@ -20,6 +20,16 @@ fn data(name: &str) -> Imported {
 
 const SQUARE: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n";
 
+/// tobj takes the normal before for a corner that names none.
+#[test]
+fn a_face_without_normals_has_none_whatever_stands_before_it() {
+    let upper = "v 0 0 1\nv 1 0 1\nv 1 1 1\nv 0 1 1\nvn 0.6 0 0.8\n";
+    for face in ["f 5 6 7 8", "f 5//1 6 7//1 8//1"] {
+        let scene = read(format!("{SQUARE}{upper}f 1//1 2//1 3//1 4//1\n{face}\n").as_bytes(), b"").unwrap().scene;
+        assert_eq!((scene.has_shading_normals(0), scene.has_shading_normals(1)), (true, false), "{face}");
+    }
+}
+
 #[test]
 fn what_is_no_scene_is_refused_with_the_cause() {
     for (text, cause) in [
