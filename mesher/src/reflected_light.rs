@@ -106,7 +106,8 @@ impl ReflectedLight {
             self.solve_roughly(scene, solution, fine, &projection, options, inquiry);
         }
         let coarse = CoarseMesh::new(scene, solution, &self.front);
-        let stand_ins = StandIns::new(scene, solution, &coarse.leaves, &coarse.mesh, &coarse.table);
+        let stand_ins =
+            StandIns::new(scene, solution, &coarse.leaves, &coarse.mesh, (&coarse.table, &coarse.looked_at));
         self.look(scene, solution, &stand_ins.queries, options, STALE, inquiry);
         if inquiry.stopped() {
             self.front = self.coarse.leaves.iter().map(|leaf| leaf.element).collect();
@@ -208,7 +209,10 @@ impl ReflectedLight {
                 let (element, count) = (probes[0].0.element, probes.len() as f64);
                 let irradiance = probes.iter().map(|(_, exact)| colour_mean(*exact)).sum::<f64>() / count;
                 let square = |(query, exact): &(SampleQuery, Rgb)| {
-                    let baked = self.coarse.place(leaf, query).map_or(Rgb::ZERO, |place| self.coarse.at(place, Light::LookedAt));
+                    let baked = self
+                        .coarse
+                        .place(leaf, query)
+                        .map_or(Rgb::ZERO, |place| self.coarse.at(place, Light::LookedAt));
                     colour_mean((baked - exact) * (baked - exact))
                 };
                 let square = probes.iter().map(square).sum::<f64>() / count;

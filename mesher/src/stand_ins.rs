@@ -27,6 +27,8 @@ pub(crate) struct StandIns {
     first: Vec<usize>,
     /// Number of a query, and how many times its light counts.
     shares: Vec<(u32, f64)>,
+    /// Samples without shares, each with the two that it is the mean of.
+    between: Vec<(u32, [u32; 2])>,
 }
 
 /// Light over a small leaf as a plane: through what it is at two places or four, about the middle along the leaf's principal
@@ -40,8 +42,15 @@ struct LeafPlane {
 }
 
 impl StandIns {
-    /// Where to look for the samples of a mesh of leaves.
-    pub fn new(scene: &Scene, solution: &Solution, leaves: &[Leaf], mesh: &Mesh, table: &SampleTable) -> Self {
+    /// Where to look for the samples of a mesh of leaves. `looked_at` names for each sample the one of the same place that is
+    /// looked at: itself, but for polygons with shading normals.
+    pub fn new(
+        scene: &Scene,
+        solution: &Solution,
+        leaves: &[Leaf],
+        mesh: &Mesh,
+        (table, looked_at): (&SampleTable, &[u32]),
+    ) -> Self {
         let small = match solution.visibility {
             Visibility::Rays => SMALL_LEAF * scene.polygon_ids().map(|polygon| scene.area(polygon)).sum::<f64>(),
             Visibility::Links => 0.0,
@@ -54,15 +63,32 @@ impl StandIns {
                 is_small.then(|| stand_ins.look_within(solution, leaf)).flatten()
             })
             .collect();
-        for (query, leaves) in table.queries.iter().zip(leaves_of_samples(mesh, table)) {
+        let leaves_of = leaves_of_samples(mesh, table);
+        let around = |sample: usize| -> Option<Vec<&LeafPlane>> {
+            leaves_of[sample].iter().map(|&leaf| planes[leaf as usize].as_ref()).collect()
+        };
+        // What is looked at by shading normals is no leaf's to pass on: neighbours that are to look like one agree on it, at the
+        // corners of small leaves, and take for linear what is between.
+        for samples in &table.triangles {
+            for [from, middle, to] in [[0, 1, 2], [2, 3, 4], [4, 5, 0]].map(|side| side.map(|i: usize| samples[i])) {
+                let shaded = looked_at[middle as usize];
+                if shaded != middle && around(middle as usize).is_some() {
+                    stand_ins.between.push((shaded, [from, to].map(|end| looked_at[end as usize])));
+                }
+            }
+        }
+        stand_ins.between.sort_unstable();
+        stand_ins.between.dedup_by_key(|(sample, _)| *sample);
+        for (sample, query) in table.queries.iter().enumerate() {
             stand_ins.first.push(stand_ins.shares.len());
-            let around: Option<Vec<&LeafPlane>> = leaves.iter().map(|&leaf| planes[leaf as usize].as_ref()).collect();
-            match around {
+            if stand_ins.between.binary_search_by_key(&(sample as u32), |(sample, _)| *sample).is_ok() {
+                continue;
+            }
+            match around(sample) {
                 Some(around) if !around.is_empty() => {
                     let part = 1.0 / around.len() as f64;
                     around.into_iter().for_each(|plane| plane.share(query.position, part, &mut stand_ins.shares));
                 }
-                // What is looked at by shading normals is no leaf's to pass on: neighbours that are to look like one agree on it.
                 _ => stand_ins.look_at(solution, query),
             }
         }
@@ -76,7 +102,11 @@ impl StandIns {
             let shares = self.shares[range[0]..range[1]].iter();
             shares.map(|&(query, part)| looked[query as usize] * part).sum::<Rgb>().max(Rgb::ZERO)
         };
-        self.first.windows(2).map(sample).collect()
+        let mut samples: Vec<Rgb> = self.first.windows(2).map(sample).collect();
+        for &(sample, [from, to]) in &self.between {
+            samples[sample as usize] = (samples[from as usize] + samples[to as usize]) / 2.0;
+        }
+        samples
     }
 
     /// Looks at a sample: at its own place, or at a contact at two places aside.
@@ -222,7 +252,8 @@ mod tests {
         let leaves: Vec<Leaf> = scene.polygon_ids().flat_map(of_polygon).collect();
         let mesh = leaf_meshes(&edge_table(&scene, &[], &leaves));
         let table = sample_table(&scene, &leaves, &mesh, &|_, _| solver::Contact::None);
-        let stand_ins = StandIns::new(&scene, &solution, &leaves, &mesh, &table);
+        let looked_at: Vec<u32> = (0..table.queries.len() as u32).collect();
+        let stand_ins = StandIns::new(&scene, &solution, &leaves, &mesh, (&table, &looked_at));
         let light = |position: DVec3| Rgb::new(1.0, 2.0, 3.0) * (1.0 + position.x + 2.0 * position.y);
         let looked: Vec<Rgb> = stand_ins.queries.iter().map(|query| light(query.position)).collect();
         let samples = stand_ins.of_samples(&looked);

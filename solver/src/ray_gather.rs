@@ -333,13 +333,14 @@ mod tests {
         let solution = solve(&room, &SolveOptions { link_error: Some(0.1), bounces: None }, &|_| ());
         let gather = RayGather::new(&room, &solution, 256, 1e-3, 0);
         let floor = solution.patch_roots(4).next().expect("the floor is a patch");
-        let view = gather.over(&solution, floor, &room.plane(4));
+        let view = gather.over(&solution, floor, &Horizon { plane: room.plane(4), tilt: 0.0 });
         assert!(view.prominent.len() > 5);
-        let mut sums = Vec::new();
+        let (mut sums, mut turned_sums) = (Vec::new(), Vec::new());
         for i in 0..40 {
             let position = DVec3::new(0.1 + 0.094 * f64::from(i), 0.2 + f64::from(i * 7 % 40) * 0.065, 0.0);
             let mut seen = Vec::new();
-            gather.seen_nodes(&solution, &view, position, DVec3::ZERO, &mut seen);
+            let point = Viewpoint::flat(position, DVec3::Z, DVec3::ZERO);
+            gather.seen_nodes(&solution, &view, &point, &mut seen);
             let sum: f64 = seen.iter().map(|seen| seen.form_factor).sum();
             sums.push(sum - 1.0);
             // About a shading normal the part below the plane is missing: (1 + cos θ)/2 is left.
@@ -347,7 +348,7 @@ mod tests {
             let (y, x) = f64::from(i).sin_cos();
             let turned = Viewpoint { normal: DVec3::new(sin * x, sin * y, cos), ..point };
             seen.clear();
-            gather.seen_nodes(&solution, &prominent, 4, &turned, &mut seen);
+            gather.seen_nodes(&solution, &view, &turned, &mut seen);
             let sum: f64 = seen.iter().map(|seen| seen.form_factor).sum();
             turned_sums.push(sum - (1.0 + cos) / 2.0);
         }
