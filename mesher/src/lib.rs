@@ -3,6 +3,7 @@
 mod arrangement;
 mod bake;
 mod claimed_error;
+mod coarse_mesh;
 mod critical_surface;
 mod discontinuity;
 mod edge_table;
@@ -14,6 +15,7 @@ mod guess;
 mod horizon;
 mod inquiry;
 mod interval;
+mod leaf_error;
 mod leaf_mesh;
 mod memory;
 mod probe;

@@ -13,16 +13,17 @@ use std::collections::HashMap;
 
 use glam::{DVec2, DVec3, Vec3};
 use rayon::prelude::*;
-use scene::{Interpolant, Rgb, Scene, Seen};
-use solver::{Cosine, ElementLight, Fan, Gather, NodeId, SeenNode, Solution, Visibility};
+use scene::{Rgb, Scene, Seen};
+use solver::{ElementLight, Gather, NodeId, SeenNode, Solution, Visibility};
 
+use crate::SampleQuery;
+use crate::coarse_mesh::{CoarseMesh, Light, Place};
 use crate::fine_mesh::FineMesh;
 use crate::inquiry::Inquiry;
-use crate::probe::colour_mean;
+use crate::leaf_error::{LeafError, ProbedLeaf, leaf_errors, leaf_probes, probe};
 use crate::projection::Projection;
 use crate::samples::QueryKey;
 use crate::stand_ins::StandIns;
-use crate::{Leaf, Mesh, SampleQuery, SampleTable, edge_table, leaf_meshes, sample_table};
 
 /// Light over reflectors on all surfaces.
 pub(crate) struct ReflectedLight {
@@ -39,39 +40,6 @@ pub(crate) struct ReflectedLight {
 
 /// What a sample sees of the reflectors.
 type Row = [Seen];
-
-/// A mesh of the front, without discontinuities.
-#[derive(Default)]
-struct CoarseMesh {
-    leaves: Vec<Leaf>,
-    mesh: Mesh,
-    /// After the samples' queries come those by shading normals, where there are such.
-    table: SampleTable,
-    /// First triangle of each leaf, and their number at the end.
-    first: Vec<usize>,
-    /// By query, irradiance over reflectors, W·m⁻².
-    values: Vec<Rgb>,
-    /// By sample, the query for what is looked at.
-    looked_at: Vec<u32>,
-}
-
-/// Which light is read from a coarse mesh.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Light {
-    PassedOn,
-    LookedAt,
-}
-
-/// What the coarse mesh gets wrong on one leaf.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct LeafError {
-    /// The element.
-    pub element: NodeId,
-    /// Root mean square over the colours, at points that nothing was fitted to, W·m⁻².
-    pub error: f64,
-    /// The mean of the exact light over reflectors there, averaged over the colours, W·m⁻².
-    pub irradiance: f64,
-}
 
 impl ReflectedLight {
     /// No light yet, and a front of elements that are no longer than `length`, metres, where the solution has such. Elements
@@ -148,8 +116,7 @@ impl ReflectedLight {
         let over_links = |solution: &Solution, element, position| {
             solution.reflected_over_links(element, offset(solution, element, position))
         };
-        let probes: Vec<SampleQuery> =
-            self.front.iter().flat_map(|&leaf| probes(solution, leaf, f64::INFINITY)).collect();
+        let probes: Vec<SampleQuery> = self.front.iter().map(|&leaf| probe(solution, leaf, 0)).collect();
         let leaf_of = leaf_numbers(solution, &self.front);
         let mut correction = vec![Rgb::ZERO; self.front.len()];
         let light = |solution: &Solution, correction: &[Rgb]| -> Vec<Rgb> {
@@ -182,7 +149,7 @@ impl ReflectedLight {
         total(&self.coarse, Light::LookedAt, &fine.shown, &self.places(solution, fine))
     }
 
-    /// The errors of all leaves of the front, each at one point, by what such a point sees. None if the bake is stopped.
+    /// The errors of all leaves of the front, by what their probes see. None if the bake is stopped.
     pub fn leaf_errors(
         &mut self,
         scene: &Scene,
@@ -190,10 +157,8 @@ impl ReflectedLight {
         options: &Exchange,
         inquiry: &mut Inquiry<'_>,
     ) -> Option<Vec<LeafError>> {
-        let area: f64 = scene.polygon_ids().map(|polygon| scene.area(polygon)).sum();
-        let probes = |&leaf: &NodeId| probes(solution, leaf, PROBED * area);
         let queries: Vec<SampleQuery> =
-            self.front.iter().flat_map(probes).map(|query| query.looked_at(scene)).collect();
+            leaf_probes(scene, solution, &self.front).into_iter().map(|query| query.looked_at(scene)).collect();
         self.look(scene, solution, &queries, options, STALE_PROBE, inquiry);
         if inquiry.stopped() {
             return None;
@@ -202,32 +167,15 @@ impl ReflectedLight {
         let looked: Vec<(SampleQuery, Rgb)> =
             queries.into_iter().zip(Radiosity::of(scene, solution).received(&rows)).collect();
         let gather = Gather::with_source_error(scene, solution, options.source_error);
-        let found: Vec<Found> = looked
-            .chunk_by(|a, b| a.0.element == b.0.element)
-            .enumerate()
-            .map(|(leaf, probes)| {
-                let (element, count) = (probes[0].0.element, probes.len() as f64);
-                let irradiance = probes.iter().map(|(_, exact)| colour_mean(*exact)).sum::<f64>() / count;
-                let square = |(query, exact): &(SampleQuery, Rgb)| {
-                    let baked = self
-                        .coarse
-                        .place(leaf, query)
-                        .map_or(Rgb::ZERO, |place| self.coarse.at(place, Light::LookedAt));
-                    colour_mean((baked - exact) * (baked - exact))
-                };
-                let square = probes.iter().map(square).sum::<f64>() / count;
-                // A probe scatters, and so do the samples about it.
-                let scatter = 2.0 * (gather.scatter(element) * irradiance).powi(2);
-                Found { element, irradiance, count, square, scatter }
-            })
-            .collect();
-        let more = more_scatter(&found);
-        let error = |found: &Found| {
-            let chance = 1.0 + (BEYOND_CHANCE.powi(2) - 1.0) / found.count.sqrt();
-            let error = (found.square - chance * more * found.scatter).max(0.0).sqrt();
-            LeafError { element: found.element, error, irradiance: found.irradiance }
-        };
-        Some(found.iter().map(error).collect())
+        let probed = looked.chunk_by(|a, b| a.0.element == b.0.element).enumerate().map(|(leaf, probes)| {
+            let baked = |query: &SampleQuery| {
+                self.coarse.place(leaf, query).map_or(Rgb::ZERO, |place| self.coarse.at(place, Light::LookedAt))
+            };
+            let both: Vec<[Rgb; 2]> = probes.iter().map(|(query, exact)| [baked(query), *exact]).collect();
+            let element = probes[0].0.element;
+            ProbedLeaf::new(element, &both, gather.scatter(element))
+        });
+        Some(leaf_errors(&probed.collect::<Vec<_>>()))
     }
 
     /// Number of points at which reflectors were looked at.
@@ -264,11 +212,10 @@ impl ReflectedLight {
         }
         let stale = if solution.visibility == Visibility::Rays { f64::INFINITY } else { stale };
         let allowed = stale * gather.budget();
-        let unknown: Vec<&SampleQuery> = queries
+        let mut unknown: Vec<&SampleQuery> = queries
             .iter()
             .filter(|query| self.rows.get(&query.key()).is_none_or(|&row| is_stale(&gather, inquiry.row(row), allowed)))
             .collect();
-        let mut unknown = unknown;
         unknown.sort_by_key(|query| query.element);
         unknown.dedup_by_key(|query| query.key());
         let found = inquiry.rows(&unknown, solution.elements.nodes.len(), |group| {
@@ -302,31 +249,6 @@ impl ReflectedLight {
     }
 }
 
-/// What the probes of a leaf found.
-struct Found {
-    element: NodeId,
-    /// Their number, and the mean of the exact light over reflectors at them, averaged over the colours, W·m⁻².
-    count: f64,
-    irradiance: f64,
-    /// Mean square of what the coarse mesh is off by, and what is expected of it for what rays scatter by alone.
-    square: f64,
-    scatter: f64,
-}
-
-/// How many times as much as expected rays scatter, as a square, by half of all leaves: few are wanting, all scatter. What
-/// rays scatter by no division mends.
-fn more_scatter(found: &[Found]) -> f64 {
-    /// The median of the square of a normal deviate.
-    const MEDIAN: f64 = 0.455;
-    let mut times: Vec<f64> =
-        found.iter().filter(|leaf| leaf.scatter > 0.0).map(|leaf| leaf.square / leaf.scatter / MEDIAN).collect();
-    let middle = times.len() / 2;
-    if times.is_empty() {
-        return 1.0;
-    }
-    times.select_nth_unstable_by(middle, f64::total_cmp).1.clamp(1.0, MOST_SCATTER)
-}
-
 /// By node of the solution, which leaf of a front it is.
 fn leaf_numbers(solution: &Solution, front: &[NodeId]) -> Vec<Option<usize>> {
     let mut numbers = vec![None; solution.elements.nodes.len()];
@@ -355,19 +277,6 @@ pub(crate) struct Exchange {
 /// nodes. Less finds most rows wanting after every division.
 const STALE: f64 = 3.0;
 
-/// Area of a leaf for which it is probed once, as a part of that of all surfaces, and probes of a leaf at most. More probes miss
-/// less of what lies in large leaves, which make up most of the error where they are wrong.
-const PROBED: f64 = 1.0 / 6000.0;
-const MOST_PROBES: f64 = 4.0;
-
-/// How many times the square of what is expected rays are believed to scatter by at most: more, and it is not scatter that all
-/// leaves are off by.
-const MOST_SCATTER: f64 = 6.0;
-
-/// Standard deviations of what rays scatter by beyond which a difference is an error. Less divides leaves for nothing, again
-/// and again.
-const BEYOND_CHANCE: f64 = 2.5;
-
 /// The same for probes, which only tell errors.
 const STALE_PROBE: f64 = 10.0;
 
@@ -377,14 +286,6 @@ const ROUGH_ITERATIONS: u32 = 6;
 
 /// Times that light is sent over the rows at most: at reflectance 0.99 about 1,600 are needed.
 const MOST_ITERATIONS: u32 = 5000;
-
-/// A place on a coarse mesh.
-#[derive(Clone, Copy)]
-struct Place {
-    triangle: u32,
-    s: f64,
-    t: f64,
-}
 
 /// A [`SeenNode`] in half of the memory.
 fn in_few_digits(seen: &SeenNode) -> Seen {
@@ -436,89 +337,4 @@ pub(crate) fn offset(solution: &Solution, element: NodeId, position: DVec3) -> D
     let elements = &solution.elements;
     let Some(patch) = elements.patch_of(element) else { return DVec2::ZERO };
     elements.patches[patch as usize].along(position - elements.nodes[element as usize].centre)
-}
-
-impl CoarseMesh {
-    fn new(scene: &Scene, solution: &Solution, front: &[NodeId]) -> Self {
-        let elements = &solution.elements;
-        let leaf = |&element: &NodeId| Leaf {
-            element,
-            polygon: elements.polygon_of(element).unwrap_or_default(),
-            outline: elements.outline(element).to_vec(),
-            segments: Vec::new(),
-        };
-        let leaves: Vec<Leaf> = front.iter().map(leaf).collect();
-        let mesh = leaf_meshes(&edge_table(scene, &solution.cuts, &leaves));
-        let gather = Gather::new(scene, solution);
-        let mut table = sample_table(scene, &leaves, &mesh, &|polygon, position| gather.contact(polygon, position));
-        let mut first = vec![0; leaves.len() + 1];
-        for triangle in &mesh.triangles {
-            first[triangle.leaf as usize + 1] += 1;
-        }
-        for i in 1..first.len() {
-            first[i] += first[i - 1];
-        }
-        let mut looked_at: Vec<u32> = (0..table.queries.len() as u32).collect();
-        let (samples, shaded) = table.shaded(scene);
-        for (number, sample) in (table.queries.len() as u32..).zip(samples) {
-            looked_at[sample] = number;
-        }
-        table.queries.extend(shaded);
-        let values = vec![Rgb::ZERO; table.queries.len()];
-        Self { leaves, mesh, table, first, values, looked_at }
-    }
-
-    fn corners(&self, triangle: usize) -> [DVec3; 3] {
-        self.mesh.triangles[triangle].vertices.map(|vertex| self.mesh.vertices[vertex as usize])
-    }
-
-    /// The value at a place, never negative.
-    fn at(&self, place: Place, light: Light) -> Rgb {
-        let samples = self.table.triangles[place.triangle as usize].map(|sample| match light {
-            Light::PassedOn => sample,
-            Light::LookedAt => self.looked_at[sample as usize],
-        });
-        Interpolant::through(samples.map(|query| self.values[query as usize])).evaluate(place.s, place.t)
-    }
-
-    /// Where a query lies within a leaf: in the triangle that it is deepest in.
-    fn place(&self, leaf: usize, query: &SampleQuery) -> Option<Place> {
-        /// Part of the way inwards by which a query on the border between two triangles is told to be on its own side.
-        const INWARDS: f64 = 1e-6;
-        let middle = scene::centroid(&self.leaves[leaf].outline);
-        let position = query.position + query.inward * (INWARDS * query.position.distance(middle));
-        let place = |triangle: usize| {
-            let [a, b, c] = self.corners(triangle);
-            let normal = (b - a).cross(c - a);
-            let part =
-                |from: DVec3, to: DVec3| normal.dot((to - from).cross(position - from)) / normal.length_squared();
-            let (s, t) = (part(c, a), part(a, b));
-            let depth = s.min(t).min(1.0 - s - t);
-            (depth, Place { triangle: triangle as u32, s, t })
-        };
-        let places = (self.first[leaf]..self.first[leaf + 1]).map(place);
-        places.max_by(|x, y| x.0.total_cmp(&y.0)).map(|(_, place)| place)
-    }
-}
-
-/// The points at which an element is probed: one, and in a scene whose light is found by rays one for each `area`, m², of a large
-/// one. They depend on the element alone: a finer neighbour changes the triangles, and what the points see is known already.
-fn probes(solution: &Solution, element: NodeId, area: f64) -> Vec<SampleQuery> {
-    let elements = &solution.elements;
-    let outline = elements.outline(element);
-    let polygon = elements.polygon_of(element).unwrap_or_default();
-    let query = |position| SampleQuery { position, polygon, element, inward: DVec3::ZERO, cosine: Cosine::Own };
-    match solution.visibility {
-        // It lies towards another edge of each element, so that what all miss is not the same.
-        Visibility::Links => {
-            let corner = |i: usize| outline[(element as usize + i) % outline.len()];
-            vec![query(elements.nodes[element as usize].centre * 0.6 + corner(0) * 0.3 + corner(1) * 0.1)]
-        }
-        // There are no lines of discontinuity, and light over small leaves is taken for linear: anywhere may be worst.
-        Visibility::Rays => {
-            let fan = Fan::new(outline);
-            let count = (elements.nodes[element as usize].area / area).ceil().clamp(1.0, MOST_PROBES) as u32;
-            (0..count).map(|i| query(fan.place(DVec2::ZERO, element.wrapping_add(i)))).collect()
-        }
-    }
 }

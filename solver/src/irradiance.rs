@@ -33,8 +33,8 @@ const SOURCE_ERROR: f64 = 1e-3;
 /// What nodes may misplace where a bake is checked by other rays, as a part of what they may in the bake.
 const SMALLER: f64 = 0.25;
 
-/// What rises over the plane of a polygon with shading normals by no more than this fraction of the scene's size does not rise: in
-/// the six digits that files keep, the next faces of a round body seem to.
+/// What rises over the plane of a polygon by no more than this fraction of the scene's size does not rise: in the six digits that
+/// files keep, the next faces of a round body seem to.
 const RISE: f64 = 1e-6;
 
 /// How other polygons touch a point of a polygon: how many values irradiance has there.
@@ -210,15 +210,11 @@ impl<'a> Gather<'a> {
     /// A point of a polygon as light arrives there; `inward` as [`Viewpoint`] has it.
     pub(crate) fn viewpoint(&self, polygon: u32, position: DVec3, inward: DVec3, cosine: Cosine) -> Viewpoint {
         let up = self.geometry.plane(polygon).normal;
-        let flat = Viewpoint::flat(position, up, inward);
-        if !self.scene.has_shading_normals(polygon) {
-            return flat;
-        }
         let normal = match cosine {
             Cosine::Own => up,
             Cosine::Shading => self.scene.shading_normal(polygon, position).unwrap_or(up),
         };
-        Viewpoint { normal, rise: RISE * self.geometry.size, ..flat }
+        Viewpoint { normal, rise: RISE * self.geometry.size, ..Viewpoint::flat(position, up, inward) }
     }
 
     /// What bounds the light on a polygon.

@@ -1,0 +1,155 @@
+//! What a mesh gets wrong on a leaf, by probes: what is beyond what rays scatter by.
+
+use glam::{DVec2, DVec3};
+use scene::{Rgb, Scene};
+use solver::{Cosine, Fan, NodeId, Solution, Visibility};
+
+use crate::SampleQuery;
+use crate::probe::colour_mean;
+
+/// Area of a leaf for which it is probed once, as a part of that of all surfaces, and probes of a leaf at most. More probes miss
+/// less of what lies in large leaves, which make up most of the error where they are wrong.
+const PROBED: f64 = 1.0 / 6000.0;
+const MOST_PROBES: f64 = 4.0;
+
+/// How many times the square of what is expected rays are believed to scatter by at most: more, and it is not scatter that all
+/// leaves are off by.
+const MOST_SCATTER: f64 = 6.0;
+
+/// Standard deviations of what rays scatter by beyond which a difference is an error. Less divides leaves for nothing, again
+/// and again.
+const BEYOND_CHANCE: f64 = 2.5;
+
+/// What the coarse mesh gets wrong on one leaf.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct LeafError {
+    /// The element.
+    pub element: NodeId,
+    /// Root mean square over the colours, at points that nothing was fitted to, W·m⁻².
+    pub error: f64,
+    /// The mean of the exact light over reflectors there, averaged over the colours, W·m⁻².
+    pub irradiance: f64,
+}
+
+/// What the probes of a leaf found.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct ProbedLeaf {
+    element: NodeId,
+    /// Their number, and the mean of the exact light over reflectors at them, averaged over the colours, W·m⁻².
+    count: f64,
+    irradiance: f64,
+    /// Mean square of what the mesh is off by, and what is expected of it for what rays scatter by alone.
+    square: f64,
+    scatter: f64,
+}
+
+impl ProbedLeaf {
+    /// From what the mesh says at each probe, and what is exact, W·m⁻². `scatter` is what rays at a point are taken to be off by,
+    /// relative to the light.
+    pub fn new(element: NodeId, probes: &[[Rgb; 2]], scatter: f64) -> Self {
+        let count = probes.len() as f64;
+        let irradiance = probes.iter().map(|[_, exact]| colour_mean(*exact)).sum::<f64>() / count;
+        let square = |[baked, exact]: &[Rgb; 2]| colour_mean((baked - exact) * (baked - exact));
+        Self {
+            element,
+            count,
+            irradiance,
+            square: probes.iter().map(square).sum::<f64>() / count,
+            // A probe scatters, and so do the samples about it.
+            scatter: 2.0 * (scatter * irradiance).powi(2),
+        }
+    }
+}
+
+/// The errors of leaves that have been probed.
+pub(crate) fn leaf_errors(leaves: &[ProbedLeaf]) -> Vec<LeafError> {
+    let more = more_scatter(leaves);
+    let error = |leaf: &ProbedLeaf| {
+        let chance = 1.0 + (BEYOND_CHANCE.powi(2) - 1.0) / leaf.count.sqrt();
+        let error = (leaf.square - chance * more * leaf.scatter).max(0.0).sqrt();
+        LeafError { element: leaf.element, error, irradiance: leaf.irradiance }
+    };
+    leaves.iter().map(error).collect()
+}
+
+/// How many times as much as expected rays scatter, as a square, by half of all leaves: few are wanting, all scatter. What
+/// rays scatter by no division mends.
+fn more_scatter(leaves: &[ProbedLeaf]) -> f64 {
+    /// The median of the square of a normal deviate.
+    const MEDIAN: f64 = 0.455;
+    let mut times: Vec<f64> =
+        leaves.iter().filter(|leaf| leaf.scatter > 0.0).map(|leaf| leaf.square / leaf.scatter / MEDIAN).collect();
+    let middle = times.len() / 2;
+    if times.is_empty() {
+        return 1.0;
+    }
+    times.select_nth_unstable_by(middle, f64::total_cmp).1.clamp(1.0, MOST_SCATTER)
+}
+
+/// The points at which elements are probed, in their order: one each, and in a scene whose light is found by rays up to four on large
+/// ones.
+pub(crate) fn leaf_probes(scene: &Scene, solution: &Solution, elements: &[NodeId]) -> Vec<SampleQuery> {
+    let area = PROBED * scene.polygon_ids().map(|polygon| scene.area(polygon)).sum::<f64>();
+    let count = |element: NodeId| match solution.visibility {
+        Visibility::Links => 1,
+        Visibility::Rays => {
+            (solution.elements.nodes[element as usize].area / area).ceil().clamp(1.0, MOST_PROBES) as u32
+        }
+    };
+    elements.iter().flat_map(|&element| (0..count(element)).map(move |i| probe(solution, element, i))).collect()
+}
+
+/// The point number `i` at which an element is probed. It depends on the element alone: a finer neighbour changes the triangles, and
+/// what the point sees is known already.
+pub(crate) fn probe(solution: &Solution, element: NodeId, i: u32) -> SampleQuery {
+    let elements = &solution.elements;
+    let outline = elements.outline(element);
+    let position = match solution.visibility {
+        // It lies towards another edge of each element, so that what all miss is not the same.
+        Visibility::Links => {
+            let corner = |i: usize| outline[(element as usize + i) % outline.len()];
+            elements.nodes[element as usize].centre * 0.6 + corner(0) * 0.3 + corner(1) * 0.1
+        }
+        // There are no lines of discontinuity, and light over small leaves is taken for linear: anywhere may be worst.
+        Visibility::Rays => Fan::new(outline).place(DVec2::ZERO, element.wrapping_add(i)),
+    };
+    let polygon = elements.polygon_of(element).unwrap_or_default();
+    SampleQuery { position, polygon, element, inward: DVec3::ZERO, cosine: Cosine::Own }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn probed(element: NodeId, off: f64) -> ProbedLeaf {
+        ProbedLeaf::new(element, &[[Rgb::splat(1.0 + off), Rgb::ONE]], 0.01)
+    }
+
+    #[test]
+    fn no_leaves_have_no_errors() {
+        assert_eq!(leaf_errors(&[]), []);
+    }
+
+    #[test]
+    fn what_is_exact_is_no_error_and_what_all_are_off_by_is_scatter() {
+        // Twice what is expected, of either sign, on most leaves; one is wanting.
+        let leaves: Vec<ProbedLeaf> =
+            (0..101).map(|i| probed(i, if i == 50 { 0.5 } else { 0.02 * f64::from(i % 3) - 0.02 })).collect();
+        let errors = leaf_errors(&leaves);
+        assert!(errors.iter().all(|error| (error.error > 0.0) == (error.element == 50)));
+        assert!((errors[50].error - 0.5).abs() < 0.02 && errors[50].irradiance == 1.0);
+    }
+
+    #[test]
+    fn what_all_are_off_by_far_is_error() {
+        let errors = leaf_errors(&(0..9).map(|i| probed(i, 0.3)).collect::<Vec<_>>());
+        assert!(errors.iter().all(|error| error.error > 0.25), "{errors:?}");
+    }
+
+    #[test]
+    fn without_scatter_the_error_is_the_root_mean_square() {
+        let probes = [[Rgb::splat(1.3), Rgb::ONE], [Rgb::splat(0.6), Rgb::ONE]];
+        let error = leaf_errors(&[ProbedLeaf::new(4, &probes, 0.0)])[0];
+        assert!((error.error - 0.125f64.sqrt()).abs() < 1e-12);
+    }
+}
