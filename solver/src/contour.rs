@@ -16,6 +16,11 @@ const PARALLEL: f64 = 1e-13;
 /// they are too far apart for this method, so two digits more than the 1e-9 that is promised, and two in reserve.
 const DIGITS: f64 = 30.0;
 
+/// Distance from a segment's line, in its lengths, within which a piece of another lies along it: what the integral has of the
+/// distance, π times it, is then lost in what rounds an outline. Less halves edges that the digits of a file have moved apart a million
+/// times.
+const ALONG: f64 = 1e-5;
+
 /// Pieces of an edge next to where it meets another are halved this often. The integrand is u·ln u there, so the last
 /// piece misplaces the square of its length, 1e-12 of the edges' product.
 const MOST_HALVINGS: u32 = 20;
@@ -78,6 +83,16 @@ struct Segment {
 }
 
 impl Segment {
+    /// How far what keeps [`Self::logarithm_from`] from being smooth is from a piece of another segment: the segment, or its ends
+    /// alone where the piece lies along it.
+    fn distance(&self, piece: [DVec3; 2]) -> f64 {
+        let apart = |point: DVec3| (point - self.ends[0]).cross(self.direction).length();
+        if piece.into_iter().all(|point| apart(point) <= ALONG * self.length) {
+            return self.ends.map(|end| segment_distance(piece, [end; 2])).into_iter().fold(f64::INFINITY, f64::min);
+        }
+        segment_distance(piece, self.ends)
+    }
+
     /// ∫ ln r along the segment, seen from a point, in closed form.
     fn logarithm_from(&self, point: DVec3) -> f64 {
         let [w0, w1] = self.ends.map(|end| end - point);
@@ -91,7 +106,7 @@ impl Segment {
 
 /// ∬ ln r along a piece of one segment and the whole of another.
 fn graded(piece: [DVec3; 2], length: f64, inner: &Segment, halvings: u32) -> f64 {
-    let points = points_needed(length, segment_distance(piece, inner.ends), DIGITS);
+    let points = points_needed(length, inner.distance(piece), DIGITS);
     if points > MOST_POINTS && halvings < MOST_HALVINGS {
         let middle = (piece[0] + piece[1]) / 2.0;
         return graded([piece[0], middle], length / 2.0, inner, halvings + 1)
@@ -172,5 +187,22 @@ mod tests {
             assert!((segment_distance([p[1], p[0]], q) - distance).abs() < 1e-15);
         }
         assert_eq!(segment_distance([DVec3::X; 2], [DVec3::Y; 2]), 2.0_f64.sqrt());
+    }
+
+    /// An edge that two squares at a right angle have in common, but for what the digits of a file move it by: the integral moves by
+    /// as little, and the edge is halved towards its ends alone.
+    #[test]
+    fn edges_that_nearly_lie_along_each_other_are_integrated_as_if_they_did() {
+        let floor = [DVec3::ZERO, DVec3::X, DVec3::X + DVec3::Y, DVec3::Y];
+        let wall = |moved: f64| [DVec3::ZERO, DVec3::Z, DVec3::Z + DVec3::X, DVec3::new(1.0, 0.0, moved)];
+        let exact = double_contour(&floor, &wall(0.0));
+        for moved in [1e-6, -1e-6, 1e-9] {
+            assert!((double_contour(&floor, &wall(moved)) - exact).abs() < 4.0 * f64::abs(moved), "{moved}");
+        }
+        let along = Segment { ends: [DVec3::ZERO, DVec3::X], direction: DVec3::X, length: 1.0 };
+        let beside = [DVec3::new(0.4, 1e-6, 0.0), DVec3::new(0.6, 2e-6, 0.0)];
+        assert!((along.distance(beside) - 0.4).abs() < 1e-5);
+        let apart = [DVec3::new(0.4, 0.1, 0.0), DVec3::new(0.6, 0.2, 0.0)];
+        assert!((along.distance(apart) - 0.1).abs() < 1e-12);
     }
 }
