@@ -1,16 +1,22 @@
 //! What a mesh gets wrong on a leaf, by probes: what is beyond what rays scatter by.
 
+use std::collections::HashMap;
+
 use glam::{DVec2, DVec3};
 use scene::{Rgb, Scene};
 use solver::{Cosine, Fan, NodeId, Solution, Visibility};
 
-use crate::SampleQuery;
 use crate::probe::colour_mean;
+use crate::{SampleQuery, SampleTable};
 
 /// Area of a leaf for which it is probed once, as a part of that of all surfaces, and probes of a leaf at most. More probes miss
 /// less of what lies in large leaves, which make up most of the error where they are wrong.
 const PROBED: f64 = 1.0 / 6000.0;
 const MOST_PROBES: f64 = 4.0;
+
+/// How far from a contact one more probe lies, as a part of the way to the middle of the leaf. Nearer ones see a crevice that no
+/// division mends, farther ones miss what is special to the contact.
+const BESIDE: f64 = 0.15;
 
 /// How many times the square of what is expected rays are believed to scatter by at most: more, and it is not scatter that all
 /// leaves are off by.
@@ -87,16 +93,32 @@ fn more_scatter(leaves: &[ProbedLeaf]) -> f64 {
 }
 
 /// The points at which elements are probed, in their order: one each, and in a scene whose light is found by rays up to four on large
-/// ones.
-pub(crate) fn leaf_probes(scene: &Scene, solution: &Solution, elements: &[NodeId]) -> Vec<SampleQuery> {
+/// ones and one more beside a contact, where most of what is wrong is. `table` has the samples of a mesh of the elements.
+pub(crate) fn leaf_probes(
+    scene: &Scene,
+    solution: &Solution,
+    elements: &[NodeId],
+    table: &SampleTable,
+) -> Vec<SampleQuery> {
     let area = PROBED * scene.polygon_ids().map(|polygon| scene.area(polygon)).sum::<f64>();
+    let nodes = &solution.elements.nodes;
     let count = |element: NodeId| match solution.visibility {
         Visibility::Links => 1,
-        Visibility::Rays => {
-            (solution.elements.nodes[element as usize].area / area).ceil().clamp(1.0, MOST_PROBES) as u32
-        }
+        Visibility::Rays => (nodes[element as usize].area / area).ceil().clamp(1.0, MOST_PROBES) as u32,
     };
-    elements.iter().flat_map(|&element| (0..count(element)).map(move |i| probe(solution, element, i))).collect()
+    let mut contacts: HashMap<NodeId, Vec<DVec3>> = HashMap::new();
+    if solution.visibility == Visibility::Rays {
+        for query in table.queries.iter().filter(|query| query.inward != DVec3::ZERO) {
+            contacts.entry(query.element).or_default().push(query.position);
+        }
+    }
+    let beside = |element: NodeId| {
+        let positions = contacts.get(&element)?;
+        let position = positions[element as usize % positions.len()].lerp(nodes[element as usize].centre, BESIDE);
+        Some(SampleQuery { position, ..probe(solution, element, 0) })
+    };
+    let of = |&element: &NodeId| (0..count(element)).map(move |i| probe(solution, element, i)).chain(beside(element));
+    elements.iter().flat_map(of).collect()
 }
 
 /// The point number `i` at which an element is probed. It depends on the element alone: a finer neighbour changes the triangles, and
@@ -119,7 +141,10 @@ pub(crate) fn probe(solution: &Solution, element: NodeId, i: u32) -> SampleQuery
 
 #[cfg(test)]
 mod tests {
+    use solver::{SolveOptions, solve};
+
     use super::*;
+    use crate::testing::scene_of;
 
     fn probed(element: NodeId, off: f64) -> ProbedLeaf {
         ProbedLeaf::new(element, &[[Rgb::splat(1.0 + off), Rgb::ONE]], 0.01)
@@ -151,5 +176,31 @@ mod tests {
         let probes = [[Rgb::splat(1.3), Rgb::ONE], [Rgb::splat(0.6), Rgb::ONE]];
         let error = leaf_errors(&[ProbedLeaf::new(4, &probes, 0.0)])[0];
         assert!((error.error - 0.125f64.sqrt()).abs() < 1e-12);
+    }
+
+    /// A large square, and 400 strips of it that something stands on at one end.
+    #[test]
+    fn large_elements_have_more_probes_and_those_with_contacts_one_beside_them() {
+        let rectangle = |x: f64, y: f64, width: f64| {
+            [(0.0, 0.0), (width, 0.0), (width, 1.0), (0.0, 1.0)].map(|(u, v)| DVec3::new(x + u, y + v, 0.0)).to_vec()
+        };
+        let strips = (0..400).map(|i| rectangle(f64::from(i) * 1e-3, 0.0, 1e-3));
+        let scene = scene_of(&strips.chain([rectangle(1.0, 1.0, 1.0)]).collect::<Vec<_>>());
+        let solution = solve(&scene, &SolveOptions::default(), &|_| ());
+        assert_eq!(solution.visibility, Visibility::Rays);
+        let (strip, large) = (solution.leaves_of(7)[0], solution.leaves_of(400)[0]);
+        let contact =
+            SampleQuery { position: DVec3::new(7e-3, 0.0, 0.0), inward: DVec3::Y, ..probe(&solution, strip, 0) };
+        let table = SampleTable { queries: vec![contact], triangles: Vec::new() };
+        let count = |table: &SampleTable| {
+            let probes = leaf_probes(&scene, &solution, &[strip, large], table);
+            assert!(probes.iter().all(|probe| probe.inward == DVec3::ZERO));
+            [strip, large].map(|element| probes.iter().filter(|probe| probe.element == element).count())
+        };
+        let [alone, many] = count(&SampleTable::default());
+        assert!(alone < many && many <= MOST_PROBES as usize, "{alone} {many}");
+        assert_eq!(count(&table), [alone + 1, many]);
+        let beside = leaf_probes(&scene, &solution, &[strip], &table)[alone].position;
+        assert!(beside.distance(contact.position.lerp(solution.elements.nodes[strip as usize].centre, BESIDE)) < 1e-9);
     }
 }

@@ -157,8 +157,10 @@ impl ReflectedLight {
         options: &Exchange,
         inquiry: &mut Inquiry<'_>,
     ) -> Option<Vec<LeafError>> {
-        let queries: Vec<SampleQuery> =
-            leaf_probes(scene, solution, &self.front).into_iter().map(|query| query.looked_at(scene)).collect();
+        let queries: Vec<SampleQuery> = leaf_probes(scene, solution, &self.front, &self.coarse.table)
+            .into_iter()
+            .map(|query| query.looked_at(scene))
+            .collect();
         self.look(scene, solution, &queries, options, STALE_PROBE, inquiry);
         if inquiry.stopped() {
             return None;
