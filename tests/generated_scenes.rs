@@ -44,10 +44,9 @@ fn what_is_written_reads_back_to_the_same_scene_with_nothing_to_repair() {
         let imported = read_back(&scene);
         assert_eq!(imported.report.warnings, Vec::<String>::new());
         assert_eq!(imported.report.merged_faces, 0);
-        let area = |scene: &Scene| scene.polygon_ids().map(|polygon| scene.area(polygon)).sum::<f64>();
         assert_eq!(imported.scene.polygons.len(), scene.polygons.len());
         assert_eq!(imported.scene.power(), scene.power());
-        assert!((area(&imported.scene) / area(&scene) - 1.0).abs() < 1e-12);
+        assert!((imported.scene.surface_area() / scene.surface_area() - 1.0).abs() < 1e-12);
     }
 }
 

@@ -31,11 +31,6 @@ fn reflectance(scene: &Scene, name: &str) -> DVec3 {
     scene.materials.iter().find(|material| material.name == name).unwrap().reflectance
 }
 
-/// Area of all fronts, m², as a file has them.
-fn area(scene: &Scene) -> f64 {
-    scene.polygon_ids().map(|polygon| scene.area(polygon)).sum()
-}
-
 /// The counts alone.
 fn counts(report: &ImportReport) -> ImportReport {
     ImportReport { warnings: Vec::new(), ..report.clone() }
@@ -70,7 +65,7 @@ fn the_office_of_radiance() {
         ..ImportReport::default()
     };
     assert_eq!(counts(&report), expected);
-    assert!((area(&scene) - 137.48).abs() < 0.01, "{}", area(&scene));
+    assert!((scene.surface_area() - 137.48).abs() < 0.01, "{}", scene.surface_area());
 }
 
 #[test]
@@ -93,7 +88,7 @@ fn the_staircase_with_its_2432_triangles_without_area() {
     assert!(report.warnings.iter().any(|warning| warning.starts_with("2432 faces (the first in line 53348)")));
     // Its lamps and its camera see fronts.
     assert!(!report.warnings.iter().any(|warning| warning.contains("the wrong way round")), "{:?}", report.warnings);
-    assert!((area(&scene) - 1133.44).abs() < 0.01, "{}", area(&scene));
+    assert!((scene.surface_area() - 1133.44).abs() < 0.01, "{}", scene.surface_area());
 }
 
 #[test]

@@ -14,6 +14,10 @@ use crate::{SampleQuery, SampleTable};
 const PROBED: f64 = 1.0 / 6000.0;
 const MOST_PROBES: f64 = 4.0;
 
+/// Where the probe of an element lies in a scene with links, by parts of its centre and two corners: off all lines of symmetry, on
+/// which an interpolant may be right by chance.
+const BETWEEN: [f64; 3] = [0.6, 0.3, 0.1];
+
 /// How far from a contact one more probe lies, as a part of the way to the middle of the leaf. Nearer ones see a crevice that no
 /// division mends, farther ones miss what is special to the contact.
 const BESIDE: f64 = 0.15;
@@ -50,8 +54,8 @@ pub(crate) struct ProbedLeaf {
 }
 
 impl ProbedLeaf {
-    /// From what the mesh says at each probe, and what is exact, W·m⁻². `scatter` is what rays at a point are taken to be off by,
-    /// relative to the light.
+    /// From what the mesh says at each probe, and what is exact, W·m⁻². `scatter` is what rays at a point are taken to be off
+    /// by, relative to the light.
     pub fn new(element: NodeId, probes: &[[Rgb; 2]], scatter: f64) -> Self {
         let count = probes.len() as f64;
         let irradiance = probes.iter().map(|[_, exact]| colour_mean(*exact)).sum::<f64>() / count;
@@ -92,15 +96,16 @@ fn more_scatter(leaves: &[ProbedLeaf]) -> f64 {
     times.select_nth_unstable_by(middle, f64::total_cmp).1.clamp(1.0, MOST_SCATTER)
 }
 
-/// The points at which elements are probed, in their order: one each, and in a scene whose light is found by rays up to four on large
-/// ones and one more beside a contact, where most of what is wrong is. `table` has the samples of a mesh of the elements.
+/// The points at which elements are probed, in their order: one each, and in a scene whose light is found by rays up to four
+/// on large ones and one more beside a contact, where most of what is wrong is. `table` has the samples of a mesh of the
+/// elements.
 pub(crate) fn leaf_probes(
     scene: &Scene,
     solution: &Solution,
     elements: &[NodeId],
     table: &SampleTable,
 ) -> Vec<SampleQuery> {
-    let area = PROBED * scene.polygon_ids().map(|polygon| scene.area(polygon)).sum::<f64>();
+    let area = PROBED * scene.surface_area();
     let nodes = &solution.elements.nodes;
     let count = |element: NodeId| match solution.visibility {
         Visibility::Links => 1,
@@ -121,8 +126,8 @@ pub(crate) fn leaf_probes(
     elements.iter().flat_map(of).collect()
 }
 
-/// The point number `i` at which an element is probed. It depends on the element alone: a finer neighbour changes the triangles, and
-/// what the point sees is known already.
+/// The point number `i` at which an element is probed. It depends on the element alone: a finer neighbour changes the
+/// triangles, and what the point sees is known already.
 pub(crate) fn probe(solution: &Solution, element: NodeId, i: u32) -> SampleQuery {
     let elements = &solution.elements;
     let outline = elements.outline(element);
@@ -130,7 +135,8 @@ pub(crate) fn probe(solution: &Solution, element: NodeId, i: u32) -> SampleQuery
         // It lies towards another edge of each element, so that what all miss is not the same.
         Visibility::Links => {
             let corner = |i: usize| outline[(element as usize + i) % outline.len()];
-            elements.nodes[element as usize].centre * 0.6 + corner(0) * 0.3 + corner(1) * 0.1
+            let [of_centre, of_corner, of_next] = BETWEEN;
+            elements.nodes[element as usize].centre * of_centre + corner(0) * of_corner + corner(1) * of_next
         }
         // There are no lines of discontinuity, and light over small leaves is taken for linear: anywhere may be worst.
         Visibility::Rays => Fan::new(outline).place(DVec2::ZERO, element.wrapping_add(i)),

@@ -83,6 +83,11 @@ impl Scene {
         area_vector(&self.outline(polygon)).length()
     }
 
+    /// Area of all polygons, m².
+    pub fn surface_area(&self) -> f64 {
+        self.polygon_ids().map(|polygon| self.area(polygon)).sum()
+    }
+
     /// The material of a polygon.
     pub fn material(&self, polygon: u32) -> &Material {
         &self.materials[self.polygons[polygon as usize].material as usize]

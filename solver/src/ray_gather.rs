@@ -117,7 +117,7 @@ impl RayGather {
             reflectances: scene.polygon_ids().map(|polygon| luminance(scene.reflectance(polygon))).collect(),
             size: scene.size(),
             rays,
-            ample: AMPLE * scene.polygon_ids().map(|polygon| scene.area(polygon)).sum::<f64>(),
+            ample: AMPLE * scene.surface_area(),
             turn,
             budget,
         }

@@ -97,8 +97,7 @@ fn unlinked(
     options: &SolveOptions,
 ) -> Solution {
     let mut elements = Elements::new(pieces);
-    let area: f64 = scene.polygon_ids().map(|polygon| scene.area(polygon)).sum();
-    elements.divide_larger((area * LARGEST_SHARE).sqrt().min(scene.size() * LARGEST_CELL));
+    elements.divide_larger((scene.surface_area() * LARGEST_SHARE).sqrt().min(scene.size() * LARGEST_CELL));
     let dark = vec![ElementLight::default(); elements.nodes.len()];
     Solution {
         first_link: vec![0; elements.nodes.len() + 1],

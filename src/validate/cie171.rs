@@ -135,11 +135,7 @@ fn ceiling_square() -> Vec<Case> {
 
 fn conservation() -> Vec<Case> {
     let lit = Lit::solve(room_with_square(ROOM, Rgb::ZERO, FLUX));
-    vec![CONSERVATION.case("over all surfaces", FLUX, FLUX, lit.solution.mean_irradiance.x * area(&lit.scene))]
-}
-
-fn area(scene: &Scene) -> f64 {
-    scene.polygon_ids().map(|polygon| scene.area(polygon)).sum()
+    vec![CONSERVATION.case("over all surfaces", FLUX, FLUX, lit.solution.mean_irradiance.x * lit.scene.surface_area())]
 }
 
 fn reflector() -> Vec<Case> {
@@ -231,7 +227,7 @@ fn interreflection() -> Vec<Case> {
     for chunk in published.chunks(3) {
         let reflectance = Rgb::from_array(std::array::from_fn(|i| chunk.get(i).map_or(0.0, |row| row.0)));
         let scene = room_with_square(far, reflectance, FLUX);
-        let surface = area(&scene);
+        let surface = scene.surface_area();
         let direct_only = SolveOptions { bounces: Some(0), ..SolveOptions::default() };
         let direct = Lit::solve_with(scene.clone(), &direct_only, BakeOptions::default().tolerance);
         let all = Lit::solve(scene);
