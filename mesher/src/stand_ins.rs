@@ -52,7 +52,7 @@ impl StandIns {
         (table, looked_at): (&SampleTable, &[u32]),
     ) -> Self {
         let small = match solution.visibility {
-            Visibility::Rays => SMALL_LEAF * scene.polygon_ids().map(|polygon| scene.area(polygon)).sum::<f64>(),
+            Visibility::Rays => SMALL_LEAF * scene.surface_area(),
             Visibility::Links => 0.0,
         };
         let mut stand_ins = Self::default();
@@ -67,18 +67,7 @@ impl StandIns {
         let around = |sample: usize| -> Option<Vec<&LeafPlane>> {
             leaves_of[sample].iter().map(|&leaf| planes[leaf as usize].as_ref()).collect()
         };
-        // What is looked at by shading normals is no leaf's to pass on: neighbours that are to look like one agree on it, at the
-        // corners of small leaves, and take for linear what is between.
-        for samples in &table.triangles {
-            for [from, middle, to] in [[0, 1, 2], [2, 3, 4], [4, 5, 0]].map(|side| side.map(|i: usize| samples[i])) {
-                let shaded = looked_at[middle as usize];
-                if shaded != middle && around(middle as usize).is_some() {
-                    stand_ins.between.push((shaded, [from, to].map(|end| looked_at[end as usize])));
-                }
-            }
-        }
-        stand_ins.between.sort_unstable();
-        stand_ins.between.dedup_by_key(|(sample, _)| *sample);
+        stand_ins.between = between_corners(table, looked_at, |sample| around(sample as usize).is_some());
         for (sample, query) in table.queries.iter().enumerate() {
             stand_ins.first.push(stand_ins.shares.len());
             if stand_ins.between.binary_search_by_key(&(sample as u32), |(sample, _)| *sample).is_ok() {
@@ -149,6 +138,28 @@ impl LeafPlane {
             shares.extend([(query, even + slope), (query + 1, even - slope)]);
         }
     }
+}
+
+/// The samples in the middle of edges that are looked at by shading normals, each with those at the edge's ends; ascending, each once.
+/// What is so looked at is no leaf's to pass on: neighbours that are to look like one agree on it at the corners of small
+/// leaves, and take for linear what is between.
+fn between_corners(
+    table: &SampleTable,
+    looked_at: &[u32],
+    is_of_small_leaves: impl Fn(u32) -> bool,
+) -> Vec<(u32, [u32; 2])> {
+    let mut between = Vec::new();
+    for samples in &table.triangles {
+        for [from, middle, to] in [[0, 1, 2], [2, 3, 4], [4, 5, 0]].map(|side| side.map(|i: usize| samples[i])) {
+            let shaded = looked_at[middle as usize];
+            if shaded != middle && is_of_small_leaves(middle) {
+                between.push((shaded, [from, to].map(|end| looked_at[end as usize])));
+            }
+        }
+    }
+    between.sort_unstable();
+    between.dedup_by_key(|(sample, _)| *sample);
+    between
 }
 
 /// By sample, the leaves whose triangles use it, ascending.
@@ -265,10 +276,33 @@ mod tests {
         assert_eq!(asked(420), table.queries.iter().filter(|query| query.polygon == 420).count());
     }
 
+    /// Two triangles with a common edge, samples 0 to 8; all but sample 8, on a large leaf too, are looked at by another.
+    #[test]
+    fn what_is_looked_at_between_corners_is_the_mean_of_both() {
+        let triangles = vec![[0, 1, 2, 3, 4, 5], [4, 3, 2, 6, 7, 8]];
+        let table = SampleTable { queries: Vec::new(), triangles };
+        let looked_at: Vec<u32> = (10..19).collect();
+        let between = between_corners(&table, &looked_at, |sample| sample != 8);
+        let [own, common, other] = [(11, [10, 12]), (13, [12, 14]), (15, [14, 10])];
+        assert_eq!(between, [own, common, other, (16, [12, 17])]);
+        assert_eq!(between_corners(&table, &(0..9).collect::<Vec<u32>>(), |_| true), []);
+        let stand_ins = StandIns {
+            first: vec![0, 1, 2, 2],
+            shares: vec![(0, 1.0), (1, 1.0)],
+            between: vec![(2, [0, 1])],
+            ..StandIns::default()
+        };
+        assert_eq!(stand_ins.of_samples(&[Rgb::ONE, Rgb::splat(3.0)]), [1.0, 3.0, 2.0].map(Rgb::splat));
+    }
+
+    /// Angles at which corners lie on a circle.
+    fn angles() -> impl Strategy<Value = Vec<f64>> {
+        prop::collection::vec(0.0..std::f64::consts::TAU, 3..9)
+    }
+
     proptest! {
         #[test]
-        fn looks_lie_within_convex_outlines(angles in prop::collection::vec(0.0..std::f64::consts::TAU, 3..9), squeeze in 0.05..1.0f64) {
-            let mut angles = angles;
+        fn looks_lie_within_convex_outlines(mut angles in angles(), squeeze in 0.05..1.0f64) {
             angles.sort_by(f64::total_cmp);
             let outline: Vec<DVec3> =
                 angles.iter().map(|angle| DVec3::new(angle.cos(), angle.sin() * squeeze, 2.0)).collect();
