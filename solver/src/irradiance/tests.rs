@@ -43,6 +43,12 @@ fn linked_and_not(build: impl Fn() -> Builder) -> [Scene; 2] {
     [build().build(), many.build()]
 }
 
+/// A square floor about the origin, polygon 0, and a lamp; with links and without.
+fn floor_and_lamp(half: f64, lamp: &[DVec3]) -> [Scene; 2] {
+    let floor = rectangle(DVec3::ZERO, half, true);
+    linked_and_not(|| Builder::default().material(0.5, 0.0).polygon(&floor).material(0.0, 1.0).polygon(lamp))
+}
+
 /// The direct light at a position of polygon 0 with a shading normal.
 fn direct(scene: &Scene, position: DVec3, normal: DVec3) -> f64 {
     let mut scene = scene.clone();
@@ -59,10 +65,7 @@ fn assert_close(value: f64, exact: f64, relative: f64) {
 #[test]
 fn a_normal_that_is_none_changes_nothing() {
     let lamp = rectangle(DVec3::new(0.5, 0.2, 2.0), 0.6, false);
-    let floor = rectangle(DVec3::ZERO, 1.0, true);
-    for scene in
-        linked_and_not(|| Builder::default().material(0.5, 0.0).polygon(&floor).material(0.0, 1.0).polygon(&lamp))
-    {
+    for scene in floor_and_lamp(1.0, &lamp) {
         let position = DVec3::new(0.1, 0.2, 0.0);
         let flat = direct(&scene, position, DVec3::ZERO);
         assert_close(flat, PI * form_factor_at(position, DVec3::Z, &lamp), 1e-12);
@@ -76,10 +79,7 @@ fn a_normal_that_is_none_changes_nothing() {
 #[test]
 fn a_lamp_gives_what_lambert_says_for_the_shading_normal() {
     let lamp = rectangle(DVec3::new(0.5, 0.2, 2.0), 0.6, false);
-    let floor = rectangle(DVec3::ZERO, 1.0, true);
-    for scene in
-        linked_and_not(|| Builder::default().material(0.5, 0.0).polygon(&floor).material(0.0, 1.0).polygon(&lamp))
-    {
+    for scene in floor_and_lamp(1.0, &lamp) {
         let position = DVec3::new(0.1, 0.2, 0.0);
         let mut cut = 0;
         for (angle, towards) in [(0.1, 0.0), (0.5, 1.0), (1.0, 4.0), (1.4, 3.1), (1.4, 3.6), (1.2, 0.1)] {
@@ -105,10 +105,7 @@ fn below_the_polygons_own_plane_nothing_counts() {
             .collect()
     };
     let (lamp, above): (Vec<DVec3>, Vec<DVec3>) = (wall(-1.0), wall(0.0));
-    let floor = rectangle(DVec3::ZERO, 0.1, true);
-    for scene in
-        linked_and_not(|| Builder::default().material(0.5, 0.0).polygon(&floor).material(0.0, 1.0).polygon(&lamp))
-    {
+    for scene in floor_and_lamp(0.1, &lamp) {
         for angle in [0.2, 0.8, 1.3] {
             let normal = turned(angle, 0.0).as_vec3().as_dvec3().normalize();
             let exact = PI * form_factor_at(DVec3::ZERO, normal, &above);
