@@ -187,8 +187,8 @@ fn neighbouring_faces_agree_where_the_file_has_normals() {
     assert!(jump < 0.01 && triangles < 8000, "{jump}, {triangles}");
 }
 
-/// A closed room of B = M/(1−ρ) whose walls, n × n squares each, all have a normal turned by θ: all are lit by B (1 + cos θ)/2, and
-/// pass on as much as if none were.
+/// A closed room of B = M/(1−ρ) whose walls, n × n squares each, all have a normal turned by θ: all are lit by
+/// B (1 + cos θ)/2, and pass on as much as if none were.
 #[test]
 fn the_furnace_with_turned_normals() {
     let (reflectance, exitance, angle) = (0.5, 1.0, 0.7_f64);

@@ -84,8 +84,8 @@ enum Side {
     Of(u32),
 }
 
-/// Finds the samples of a mesh, all by polygons' own normals. `contact` says how other polygons touch a point of a polygon; it is asked only on
-/// borders of leaves, which is where contact can be.
+/// Finds the samples of a mesh, all by polygons' own normals. `contact` says how other polygons touch a point of a polygon;
+/// it is asked only on borders of leaves, which is where contact can be.
 pub fn sample_table(
     scene: &Scene,
     leaves: &[Leaf],

@@ -1,6 +1,7 @@
-//! Small patches of scenes of many: one look at the emitters in the middle stands for all samples of such a patch, until a probe
-//! elsewhere on it says otherwise and it is divided. A tessellated lamp or chair so costs two looks a triangle, not seven. Where it has
-//! shading normals this is what it passes on; what is looked at is looked for at every sample, so that neighbours agree where they meet.
+//! Small patches of scenes of many: one look at the emitters in the middle stands for all samples of such a patch, until a
+//! probe elsewhere on it says otherwise and it is divided. A tessellated lamp or chair so costs two looks a triangle, not
+//! seven. Where it has shading normals this is what it passes on; what is looked at is looked for at every sample, so that
+//! neighbours agree where they meet.
 
 use glam::DVec3;
 use solver::{Cosine, Solution, Visibility};

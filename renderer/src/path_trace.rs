@@ -72,7 +72,8 @@ pub fn irradiance(scene: &Scene, bvh: &Bvh, points: &[(DVec3, DVec3)], options: 
     points.par_iter().enumerate().map(estimate).collect()
 }
 
-/// Irradiance at points of surfaces, by their shading normals if any, W·m⁻², each by as many paths as `samples` has for it, rounded up to a multiple of 32.
+/// Irradiance at points of surfaces, by their shading normals if any, W·m⁻², each by as many paths as `samples` has for it,
+/// rounded up to a multiple of 32.
 ///
 /// `bounces` and `seed` are those of [`PathOptions`]; `done` is called after every point, from any thread. `bvh` is
 /// [`Bvh::of_scene`] of the same scene. The result does not depend on the number of threads.

@@ -91,8 +91,8 @@ impl<'a> Surfaces<'a> {
         self.bvh.is_blocked_among(receiver.position, target, between)
     }
 
-    /// The receiver that is looked at at a given place: on the nearest polygon within [`REACH`] whose front agrees with the normal, in
-    /// its plane, or in empty space.
+    /// The receiver that is looked at at a given place: on the nearest polygon within [`REACH`] whose front agrees with the
+    /// normal, in its plane, or in empty space.
     pub fn receiver_at(&self, position: DVec3, normal: DVec3) -> Receiver {
         let normal = normal.normalize_or_zero();
         match self.bvh.nearest_surface(position, normal, REACH * self.scene.size()) {

@@ -40,12 +40,14 @@ pub struct Viewpoint {
     pub position: DVec3,
     /// Unit normal of the receiver's plane: only what is above it is seen.
     pub up: DVec3,
-    /// Unit normal that the cosine of arriving light is to: `up`, or a shading normal, below whose horizon nothing counts either.
+    /// Unit normal that the cosine of arriving light is to: `up`, or a shading normal, below whose horizon nothing counts
+    /// either.
     pub normal: DVec3,
     /// Direction in the receiver's plane: where something touches the point, the limit from point + ε·inward counts.
     /// Zero for a point that nothing touches.
     pub inward: DVec3,
-    /// What rises over the plane by no more than this, metres, is not met on any way from the point; minus infinity where all may be.
+    /// What rises over the plane by no more than this, metres, is not met on any way from the point; minus infinity where all
+    /// may be.
     pub rise: f64,
 }
 

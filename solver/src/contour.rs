@@ -16,9 +16,9 @@ const PARALLEL: f64 = 1e-13;
 /// they are too far apart for this method, so two digits more than the 1e-9 that is promised, and two in reserve.
 const DIGITS: f64 = 30.0;
 
-/// Distance from a segment's line, in its lengths, within which a piece of another lies along it: what the integral has of the
-/// distance, π times it, is then lost in what rounds an outline. Less halves edges that the digits of a file have moved apart a million
-/// times.
+/// Distance from a segment's line, in its lengths, within which a piece of another lies along it: what the integral has of
+/// the distance, π times it, is then lost in what rounds an outline. Less halves edges that the digits of a file have moved
+/// apart a million times.
 const ALONG: f64 = 1e-5;
 
 /// Pieces of an edge next to where it meets another are halved this often. The integrand is u·ln u there, so the last
@@ -189,8 +189,8 @@ mod tests {
         assert_eq!(segment_distance([DVec3::X; 2], [DVec3::Y; 2]), 2.0_f64.sqrt());
     }
 
-    /// An edge that two squares at a right angle have in common, but for what the digits of a file move it by: the integral moves by
-    /// as little, and the edge is halved towards its ends alone.
+    /// An edge that two squares at a right angle have in common, but for what the digits of a file move it by: the integral
+    /// moves by as little, and the edge is halved towards its ends alone.
     #[test]
     fn edges_that_nearly_lie_along_each_other_are_integrated_as_if_they_did() {
         let floor = [DVec3::ZERO, DVec3::X, DVec3::X + DVec3::Y, DVec3::Y];

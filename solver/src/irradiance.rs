@@ -33,8 +33,8 @@ const SOURCE_ERROR: f64 = 1e-3;
 /// What nodes may misplace where a bake is checked by other rays, as a part of what they may in the bake.
 const SMALLER: f64 = 0.25;
 
-/// What rises over the plane of a polygon by no more than this fraction of the scene's size does not rise: in the six digits that
-/// files keep, the next faces of a round body seem to.
+/// What rises over the plane of a polygon by no more than this fraction of the scene's size does not rise: in the six digits
+/// that files keep, the next faces of a round body seem to.
 const RISE: f64 = 1e-6;
 
 /// How other polygons touch a point of a polygon: how many values irradiance has there.
@@ -366,8 +366,9 @@ impl<'a> Gather<'a> {
         }
     }
 
-    /// Irradiance at a position in the plane of a polygon, by its shading normal if it has one, W·m⁻²; `inward` is the direction in the plane from whose
-    /// side the limit is taken where other polygons touch the position. Finds the leaf by itself: for single points.
+    /// Irradiance at a position in the plane of a polygon, by its shading normal if it has one, W·m⁻²; `inward` is the
+    /// direction in the plane from whose side the limit is taken where other polygons touch the position. Finds the leaf by
+    /// itself: for single points.
     pub fn irradiance_at(&self, polygon: u32, position: DVec3, inward: DVec3) -> Rgb {
         match self.leaf_under(polygon, position, DVec3::ZERO, inward) {
             Some(leaf) => self.over(leaf).irradiance(position, inward),

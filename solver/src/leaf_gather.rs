@@ -119,8 +119,8 @@ enum Light {
 }
 
 impl LeafGather<'_> {
-    /// Irradiance at a position of the leaf, by the shading normal if it has one, W·m⁻². `inward` is a direction in the leaf's plane: where other polygons
-    /// touch the position, the limit is taken from that side; elsewhere it has no influence.
+    /// Irradiance at a position of the leaf, by the shading normal if it has one, W·m⁻². `inward` is a direction in the leaf's
+    /// plane: where other polygons touch the position, the limit is taken from that side; elsewhere it has no influence.
     pub fn irradiance(&self, position: DVec3, inward: DVec3) -> Rgb {
         let mut seen = Vec::new();
         let emitted = match self.gather.rays() {

@@ -62,9 +62,12 @@ impl PolygonTree {
                 entered.set(found.len());
             },
         );
+        if entered.get() > MOST_TRIANGLES {
+            return Stands::Many;
+        }
         found.sort_unstable();
         found.dedup();
-        if found.len() > MOST_CANDIDATES || entered.get() > MOST_TRIANGLES {
+        if found.len() > MOST_CANDIDATES {
             return Stands::Many;
         }
         let mut is_total = false;
