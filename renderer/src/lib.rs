@@ -1,13 +1,31 @@
-//! Images and references from rays. For now the reference: an unbiased path tracer that shares nothing with the
-//! solver or the mesher, so that what it says of a bake is an independent opinion.
+//! Images and references from rays.
+//!
+//! The reference is an unbiased path tracer that shares nothing with the solver or the mesher, so that what it says of a bake is an
+//! independent opinion. Images are made by samplers, which know nothing of where light comes from: they are handed a function
+//! from a point of the image plane to what is seen there ([`Evaluator`]), and a [`Film`] makes a picture of their samples.
 
+mod adaptive;
+mod cell;
+mod confidence;
 mod emitters;
+mod evaluation;
+mod film;
+mod filter;
+mod kd_tree;
 mod path_trace;
 mod reference;
 mod sequence;
 mod spherical_triangle;
 mod surface;
+mod survey;
 
+pub use adaptive::{AdaptiveOptions, AdaptiveSampler};
+pub use cell::MOST_PIXELS;
+pub use confidence::Interval;
+pub use evaluation::{Evaluation, Evaluator};
+pub use film::{Film, Tile};
+pub use filter::Filter;
 pub use path_trace::{Estimate, PathOptions, irradiance, irradiance_on};
 pub use reference::{Reference, ReferenceOptions, reference};
 pub use surface::{SurfacePoint, spread_by_area};
+pub use survey::Rule;

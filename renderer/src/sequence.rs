@@ -22,6 +22,18 @@ impl Stream {
     }
 }
 
+/// A number of 64 random bits for each of many numbers, other ones for each seed: two rounds of the finalizer of SplitMix64 (Steele,
+/// Lea and Flood 2014). For places that are drawn in any order, where a stream each would cost more than what it draws.
+pub(crate) fn scatter(seed: u64, number: u64) -> u64 {
+    let mix = |word: u64| {
+        let word = (word ^ word >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        let word = (word ^ word >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
+        word ^ word >> 31
+    };
+    const STEP: u64 = 0x9e37_79b9_7f4a_7c15;
+    mix(mix(seed.wrapping_add(STEP)).wrapping_add(number.wrapping_mul(STEP)))
+}
+
 /// A Kronecker sequence with a random shift: x_i = frac(shift + i·α), α_k = φ^-k, where φ solves φ^(D+1) = φ + 1.
 ///
 /// Every x_i is uniform over the cube by itself, since the shift is (Cranley and Patterson 1976), so that a mean over
@@ -64,6 +76,17 @@ mod tests {
         let mut stream = Stream::new(7, 0);
         let mean = (0..10_000).map(|_| stream.uniform()).sum::<f64>() / 1e4;
         assert!((mean - 0.5).abs() < 5.0 * (1.0 / 12e4_f64).sqrt());
+    }
+
+    #[test]
+    fn scattered_numbers_are_uniform_and_differ_by_seed() {
+        let unit = |seed, number| (scatter(seed, number) as u32) as f64 / 2f64.powi(32);
+        let halves = |shift: u64| (0..10_000).map(|i| unit(5, i << shift)).sum::<f64>() / 1e4;
+        for shift in [0, 18, 32, 50] {
+            assert!((halves(shift) - 0.5).abs() < 5.0 * (1.0 / 12e4_f64).sqrt(), "{shift}");
+        }
+        let product = (0..10_000).map(|i| (unit(5, i) - 0.5) * (unit(6, i) - 0.5)).sum::<f64>() / 1e4;
+        assert!(product.abs() < 5.0 / 12.0 / 100.0);
     }
 
     /// Of n points of the sequence every box holds its share to within far less than the √n of random points.

@@ -1,0 +1,153 @@
+//! Whether a mean is known well enough (Painter & Sloan 1989, section 3.1.3): Student's interval of confidence, and how wide it
+//! may be.
+
+use std::f64::consts::FRAC_PI_2;
+
+use glam::Vec3A;
+use scene::{encode_srgb, tone_curve};
+
+use crate::kd_tree::WHITE;
+
+/// How far from the truth the mean of a pixel may be.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Interval {
+    /// In exposed radiance, of which 1 is what a display without a tone curve shows as white.
+    Linear(f64),
+    /// In what a display shows, 0..=1, behind the tone curve and the transfer function: narrow in the dark, wide in highlights.
+    Shown(f64),
+}
+
+/// Degrees of freedom from which on the distribution is taken for that of as many: the quantile at 99 % is 2 % above the
+/// normal one's.
+const MOST_DEGREES: usize = 100;
+
+/// Means that the width of an interval is known at, spread by their square root. Between two of them it is the smaller one's.
+const STEPS: usize = 1024;
+
+/// A level and an interval, ready to be asked often.
+pub(crate) struct Confidence {
+    /// Student's t, by degrees of freedom.
+    quantiles: Vec<f32>,
+    /// Largest half width of the interval of confidence, exposed, by the mean.
+    widths: Vec<f32>,
+}
+
+impl Confidence {
+    /// With a level between 0 and 1, such as 0.99, and an interval above 0.
+    pub fn new(level: f64, interval: Interval) -> Self {
+        let quantiles = (0..=MOST_DEGREES as u32).map(|degrees| student_t(level, degrees) as f32).collect();
+        let mean = |step: usize| WHITE * (step as f32 / STEPS as f32).powi(2);
+        let widths = (0..=STEPS).map(|step| interval.half_width(mean(step))).collect();
+        Self { quantiles, widths }
+    }
+
+    /// Whether a mean with a variance, that of the channel where it is largest, is known well enough.
+    pub fn holds(&self, mean: Vec3A, variance: f32, degrees: f32) -> bool {
+        let quantile = self.quantiles[(degrees as usize).min(MOST_DEGREES)];
+        let step = |channel: f32| ((channel / WHITE).max(0.0).sqrt() * STEPS as f32) as usize;
+        let width = |channel: f32| {
+            let step = step(channel).min(STEPS - 1);
+            self.widths[step].min(self.widths[step + 1])
+        };
+        let narrowest = mean.to_array().map(width).into_iter().fold(f32::INFINITY, f32::min);
+        // Of 0 degrees the quantile is infinite, and the product with no variance no number: nothing holds.
+        quantile * variance.sqrt() <= narrowest
+    }
+}
+
+impl Interval {
+    /// The largest distance from a mean, both exposed, at which what is shown differs by no more than the interval.
+    fn half_width(self, mean: f32) -> f32 {
+        let (shown, interval) = match self {
+            Self::Linear(interval) => return interval as f32,
+            Self::Shown(interval) => (|exposed: f32| encode_srgb(tone_curve(exposed)), interval as f32),
+        };
+        let within =
+            |width: f32| shown(mean + width) - shown(mean) <= interval && shown(mean) - shown(mean - width) <= interval;
+        // A bisection of the width, which is a number between nothing and all that is told apart.
+        let halve = |(low, high): (f32, f32), _| {
+            let middle = (low + high) / 2.0;
+            if within(middle) { (middle, high) } else { (low, middle) }
+        };
+        (0..32).fold((0.0, 2.0 * WHITE), halve).0
+    }
+}
+
+/// Student's t: where the distribution with so many degrees of freedom has the share `level` between −t and t. Infinite for
+/// none.
+fn student_t(level: f64, degrees: u32) -> f64 {
+    if degrees == 0 {
+        return f64::INFINITY;
+    }
+    // The share as a function of θ = atan(t / √ν) (Abramowitz and Stegun 1964, 26.7.3 and 26.7.4) grows from 0 to 1.
+    let share = |angle: f64| {
+        let (sin, cos) = angle.sin_cos();
+        let odd = degrees % 2;
+        let (mut term, mut sum) = (if odd == 1 { cos } else { 1.0 }, 0.0);
+        for k in (odd + 1..degrees).step_by(2) {
+            sum += term;
+            term *= f64::from(k) / f64::from(k + 1) * cos * cos;
+        }
+        if odd == 1 { (angle + sin * sum) / FRAC_PI_2 } else { sin * sum }
+    };
+    let halve = |(low, high): (f64, f64), _| {
+        let middle = (low + high) / 2.0;
+        if share(middle) < level { (middle, high) } else { (low, middle) }
+    };
+    let (angle, _) = (0..60).fold((0.0, FRAC_PI_2), halve);
+    angle.tan() * f64::from(degrees).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_quantiles_are_those_of_the_tables() {
+        assert_eq!(student_t(0.99, 0), f64::INFINITY);
+        for (level, degrees, expected) in [
+            (0.99, 1, 63.657),
+            (0.99, 2, 9.925),
+            (0.99, 3, 5.841),
+            (0.99, 4, 4.604),
+            (0.99, 8, 3.355),
+            (0.99, 30, 2.750),
+            (0.99, 100, 2.626),
+            (0.95, 1, 12.706),
+            (0.95, 10, 2.228),
+            (0.5, 1, 1.0),
+        ] {
+            let t = student_t(level, degrees);
+            assert!((t - expected).abs() < 6e-4, "{t} for {expected} at {level}, {degrees}");
+        }
+    }
+
+    #[test]
+    fn nothing_is_known_from_one_sample_and_all_where_nothing_varies() {
+        let confidence = Confidence::new(0.99, Interval::Linear(0.01));
+        assert!(!confidence.holds(Vec3A::ONE, 0.0, 0.0));
+        assert!(!confidence.holds(Vec3A::ONE, f32::NAN, 9.0));
+        assert!(confidence.holds(Vec3A::ONE, 0.0, 1.0));
+        let half = |t: f32| (0.01 / t).powi(2);
+        assert!(confidence.holds(Vec3A::ONE, half(3.36), 8.0) && !confidence.holds(Vec3A::ONE, half(3.35), 8.0));
+        assert!(confidence.holds(Vec3A::ONE, half(2.63), 1e9) && !confidence.holds(Vec3A::ONE, half(2.62), 1e9));
+    }
+
+    /// A step of what is shown is a small step of radiance in the dark, and a large one in highlights.
+    #[test]
+    fn an_interval_of_what_is_shown_follows_the_tone_curve() {
+        let interval = Interval::Shown(1.0 / 255.0);
+        for mean in [0.0, 0.01, 0.18, 0.6, 1.0, 3.0] {
+            let width = interval.half_width(mean);
+            let shown = |exposed: f32| encode_srgb(tone_curve(exposed)) * 255.0;
+            let change = (shown(mean + width) - shown(mean)).max(shown(mean) - shown(mean - width));
+            assert!((change - 1.0).abs() < 1e-2, "{change} at {mean}");
+        }
+        let widths = [0.0, 0.01, 0.1, 0.5, 1.0, 2.0].map(|mean| interval.half_width(mean));
+        assert!(widths.is_sorted(), "{widths:?}");
+        let confidence = Confidence::new(0.99, interval);
+        let variance = (0.003_f32 / 3.4).powi(2);
+        assert!(confidence.holds(Vec3A::splat(0.5), variance, 8.0));
+        assert!(!confidence.holds(Vec3A::new(0.5, 0.01, 0.5), variance, 8.0), "the dark channel counts, too");
+    }
+}
