@@ -69,8 +69,16 @@ pub fn no_bake(path: &Path, flags: SceneFlags) -> Result<()> {
     Ok(())
 }
 
-/// Refuses a scene that is dark.
+/// Refuses a scene without surfaces that emit; says of other lights that they count nothing.
 pub fn require_light(path: &Path, scene: &Scene) -> Result<()> {
+    if !scene.lights.is_empty() {
+        say(format_args!(
+            "warning: {}: lights without a surface ({}) are passed over: a bake holds the light of surfaces; `halflight \
+             render --radiance whitted` sees them",
+            path.display(),
+            scene.lights.len()
+        ));
+    }
     ensure!(
         scene.emitters().next().is_some(),
         "{}: nothing emits light; give a material that its faces use an emitted radiance (W/(sr m²)), such as the line \

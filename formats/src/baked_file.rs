@@ -6,7 +6,7 @@
 //! | 8..12 | version, u32 |
 //! | 12..16 | length of the header, u32 |
 //! | 16..20 | CRC-32 of bytes 0..16 and the header, u32 |
-//! | 20.. | header: what made the bake, its error, materials, textures' names and sizes, objects, cameras and the table of sections, in bincode |
+//! | 20.. | header: what made the bake, its error, materials, textures' names and sizes, objects, cameras, lights and the table of sections, in bincode |
 //! | then | the sections, one after another without gaps |
 //!
 //! Everything is little-endian. A section is an array of fixed-size rows: positions in metres, irradiance in W·m⁻²,
@@ -17,7 +17,7 @@ use std::fs;
 use std::io::Read;
 use std::path::Path;
 
-use scene::{Baked, BakedError, Material, NamedCamera, Provenance, Scene, Texture, Unfinished};
+use scene::{Baked, BakedError, Light, Material, NamedCamera, Provenance, Scene, Texture, Unfinished};
 use serde::{Deserialize, Serialize};
 
 use crate::record::{Record, from_bytes, to_bytes};
@@ -27,7 +27,7 @@ use crate::{FormatError, write_atomically};
 const MAGIC: [u8; 8] = *b"\x89HLF\r\n\x1a\n";
 
 /// Raised with every change that an older program would misread.
-const VERSION: u32 = 3;
+const VERSION: u32 = 4;
 
 /// Bytes before the header.
 const PREAMBLE: usize = 20;
@@ -44,6 +44,7 @@ struct Header {
     textures: Vec<(String, u32, u32)>,
     objects: Vec<String>,
     cameras: Vec<NamedCamera>,
+    lights: Vec<Light>,
     sections: Vec<Section>,
 }
 
@@ -115,6 +116,7 @@ fn write(path: &Path, baked: &Baked, unfinished: Option<&Unfinished>) -> Result<
         textures: scene.textures.iter().map(|t| (t.name.clone(), t.width, t.height)).collect(),
         objects: scene.objects.clone(),
         cameras: scene.cameras.clone(),
+        lights: scene.lights.clone(),
         sections: sections.collect(),
     };
     let too_large = || FormatError::content(path, "the bake's names and options fill a gigabyte", "shorten the names");
@@ -208,6 +210,7 @@ pub fn read_unfinished(path: &Path) -> Result<(Baked, Option<Unfinished>), Forma
             textures,
             objects: header.objects,
             cameras: header.cameras,
+            lights: header.lights,
         },
         vertices: sections.rows("vertices")?,
         samples: sections.rows("samples")?,
@@ -286,7 +289,7 @@ mod tests {
     use glam::{DVec3, Vec2, Vec3};
     use proptest::prelude::*;
     use scene::{
-        Answers, BakedElement, BakedTriangle, Camera, DiscontinuityLine, EdgeKind, LineKind, Polygon, Rgb, Seen,
+        Answers, BakedElement, BakedTriangle, Camera, DiscontinuityLine, EdgeKind, Gloss, LineKind, Polygon, Rgb, Seen,
     };
 
     use super::*;
@@ -309,13 +312,21 @@ mod tests {
                 shading_normals: vec![Vec3::Z, Vec3::ZERO, Vec3::Z, Vec3::Z],
                 polygons: vec![Polygon { first_corner: 0, corner_count: 4, material: 0, object: 0 }],
                 tints: vec![DVec3::new(0.1, 0.2, 0.3)],
-                materials: vec![Material { texture: Some(1), ..Material::grey("wall") }],
+                materials: vec![Material {
+                    texture: Some(1),
+                    gloss: Some(Gloss { diffuse: Rgb::X, specular: Rgb::splat(0.25), exponent: 30.0, is_mirror: true }),
+                    ..Material::grey("wall")
+                }],
                 textures: [1, 2].map(|width| texture(width, 3)).to_vec(),
                 objects: vec!["room".into()],
                 cameras: vec![NamedCamera {
                     name: "camera".into(),
                     camera: Camera { eye: DVec3::Z, target: DVec3::ZERO, up: DVec3::Y, vertical_fov: 1.0 },
                 }],
+                lights: vec![
+                    Light::Point { position: DVec3::ONE, intensity: Rgb::Y },
+                    Light::Directional { direction: DVec3::Z, irradiance: Rgb::ONE },
+                ],
             },
             vertices: corners.map(|corner| corner.as_vec3()).to_vec(),
             samples: (0..6).map(|i| Vec3::splat(i as f32 * 0.1)).collect(),

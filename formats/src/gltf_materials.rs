@@ -168,7 +168,7 @@ pub(crate) fn read_materials(
             materials.metals.retain(|metal| *metal != name);
         }
         materials.list.push(found);
-        model.materials.push(Material { name, reflectance, texture: base_texture, radiance });
+        model.materials.push(Material { name, reflectance, texture: base_texture, radiance, gloss: None });
     }
     materials.list.push(GltfMaterial { material: model.materials.len() as u32, ..GltfMaterial::default() });
     model.materials.push(Material::grey("unassigned"));

@@ -67,7 +67,8 @@ pub fn read_scene(path: &Path) -> Result<Imported, FormatError> {
 /// diffuse and opaque: what a file says of mirrors, metals and glass is taken by stated rules, which count in the report.
 ///
 /// Of an OBJ, `Kd` is the reflectance, `Ke` the emitted radiance in W·sr⁻¹·m⁻², `map_Kd` a texture of the reflectance. A mirror
-/// (`illum` 3, 5, 8) or a metal (`Kd` black, `Ks` not) reflects `Kd` + `Ks` diffusely; `d` below 0.5 is left out.
+/// (`illum` 3, 5, 8) or a metal (`Kd` black, `Ks` not) reflects `Kd` + `Ks` diffusely, and [`scene::Gloss`] keeps what it is; `d`
+/// below 0.5 is left out.
 ///
 /// Of a glTF file, the base colour is the reflectance (of metals, too), the emissive factor times its strength the emitted
 /// radiance, nits per channel taken as W·sr⁻¹·m⁻²; double-sided materials make two polygons, and what is translucent with a
@@ -142,6 +143,7 @@ fn repair(path: &Path, mut model: Model, sides: Sides, report: &mut ImportReport
         textures: model.textures,
         objects: model.objects,
         cameras: model.cameras,
+        lights: model.lights,
         ..Scene::default()
     };
     // Vertices that no polygon uses any more are left out; the others are numbered as polygons come to them.

@@ -5,7 +5,7 @@ use std::fmt::Write;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use scene::{Material, Rgb, Texture};
+use scene::{Gloss, Material, Rgb, Texture};
 
 use crate::FormatError;
 use crate::obj_text::{Named, number, whole_lines};
@@ -21,6 +21,9 @@ pub(crate) const LEAST_OPACITY: f64 = 0.5;
 
 /// Illumination models of MTL that reflect as a mirror does.
 const MIRROR_MODELS: [u32; 3] = [3, 5, 8];
+
+/// Illumination models of MTL without highlights: colour alone, and diffuse reflection.
+const DULL_MODELS: [u32; 2] = [0, 1];
 
 /// Relative difference of Kd from a texture's mean within which it is that mean: rounding, and the loss of an image that
 /// was compressed again.
@@ -76,7 +79,8 @@ impl Materials {
 /// without `Ke` emits nothing. What is no diffuse reflection is taken as follows, and counted:
 ///
 /// - A mirror (`illum` 3, 5 or 8) and a metal (`Kd` black and `Ks` not) reflect diffusely what they reflect in all,
-///   `Kd` + `Ks`, limited to 0.999. Other highlights (`Ks`) are passed over.
+///   `Kd` + `Ks`, limited to 0.999. What they are is kept beside that ([`Gloss`]), and so are highlights: `Ks` with an
+///   exponent (`Ns`), unless `illum` is 0 or 1.
 /// - What is seen through for the most part (`d` below 0.5, or `Tr` above) is left out, if it does not emit; other `d` are
 ///   passed over.
 /// - `map_Kd` is the texture, its options are passed over. `Kd` multiplies it, unless it is black or the mean colour
@@ -157,6 +161,7 @@ fn read_library(
         let other = clean.other.get(&material.name).cloned().unwrap_or_default();
         let is_metal = material.diffuse.is_some() && reflectance == Rgb::ZERO && radiance == Rgb::ZERO;
         let is_left_out = other.opacity.is_some_and(|opacity| opacity < LEAST_OPACITY) && radiance == Rgb::ZERO;
+        let (diffuse, specular) = (reflectance, other.specular.min(Rgb::ONE));
         let mut texture = None;
         if let Some(file) = &other.texture {
             texture = materials.texture(path, file, report);
@@ -169,7 +174,7 @@ fn read_library(
                     }
                 }
             }
-        } else if other.is_mirror || is_metal && other.specular != Rgb::ZERO {
+        } else if other.is_mirror() || is_metal && other.specular != Rgb::ZERO {
             reflectance += other.specular;
             if !is_left_out {
                 mirrors.push(material.name.clone());
@@ -186,7 +191,13 @@ fn read_library(
         if is_left_out {
             materials.left_out.insert(materials.list.len());
         }
-        materials.add(Material { name: material.name, reflectance, texture, radiance });
+        let gloss = (specular != Rgb::ZERO && (other.is_mirror() || other.has_highlights())).then(|| Gloss {
+            diffuse: if texture.is_some() { reflectance } else { diffuse.min(reflectance) },
+            specular,
+            exponent: other.exponent,
+            is_mirror: other.is_mirror(),
+        });
+        materials.add(Material { name: material.name, reflectance, texture, radiance, gloss });
     }
     report.clamped_materials += too_bright.len();
     report.textured_materials += unread.len();
@@ -221,10 +232,22 @@ struct MtlText {
 #[derive(Clone, Default)]
 struct OtherValues {
     specular: Rgb,
+    /// Of highlights; 0 is none.
+    exponent: f64,
     opacity: Option<f64>,
-    is_mirror: bool,
+    illumination: Option<u32>,
     /// The file of map_Kd.
     texture: Option<String>,
+}
+
+impl OtherValues {
+    fn is_mirror(&self) -> bool {
+        self.illumination.is_some_and(|model| MIRROR_MODELS.contains(&model))
+    }
+
+    fn has_highlights(&self) -> bool {
+        self.exponent > 0.0 && !self.illumination.is_some_and(|model| DULL_MODELS.contains(&model))
+    }
 }
 
 /// Checks an MTL text: tobj panics on a colour of fewer than three numbers, and refuses a whole library for a wrong
@@ -259,7 +282,12 @@ fn check(path: &Path, text: &str) -> Result<MtlText, FormatError> {
                 Ok(())
             }
             ("illum", Some(name)) => {
-                checked.other(name).is_mirror = rest.parse().is_ok_and(|model| MIRROR_MODELS.contains(&model));
+                checked.other(name).illumination = rest.parse().ok();
+                Ok(())
+            }
+            ("Ns", Some(name)) => {
+                let exponent = rest.parse::<f64>().ok().filter(|exponent| exponent.is_finite() && *exponent > 0.0);
+                checked.other(name).exponent = exponent.unwrap_or(0.0);
                 Ok(())
             }
             ("map_Kd", Some(name)) => {

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, HashMap};
 
 use glam::{DMat3, DMat4, DVec3};
-use scene::{Material, NamedCamera, Texture, area_vector};
+use scene::{Light, Material, NamedCamera, Texture, area_vector};
 
 use crate::attributes::AttributeTable;
 use crate::face::{Corner, Face};
@@ -23,6 +23,8 @@ pub(crate) struct Model {
     pub textures: Vec<Texture>,
     pub objects: Vec<String>,
     pub cameras: Vec<NamedCamera>,
+    /// Lights that are no surfaces.
+    pub lights: Vec<Light>,
     /// The direction that the file says is up.
     pub up: Option<DVec3>,
     /// What [`Face::line`] counts, for messages; empty is lines.
@@ -95,6 +97,7 @@ impl Model {
                 let mut material = self.materials[face.material as usize].clone();
                 material.texture = None;
                 material.reflectance *= mean;
+                material.gloss.iter_mut().for_each(|gloss| gloss.diffuse *= mean);
                 self.materials.push(material);
                 let id = self.materials.len() as u32 - 1;
                 if let Some(&word) = self.two_sided.get(&face.material) {

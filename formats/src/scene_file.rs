@@ -15,6 +15,9 @@
 //! [material.wall]             # every material of that name
 //! reflectance = [0.7, 0.7, 0.6]   # a number or red, green, blue; in place of a texture
 //! radiance = 0                # W/(sr m²)
+//! specular = 0.2              # of highlights or of a mirror, for pictures along rays; a bake knows the reflectance alone
+//! exponent = 50               # of highlights (the larger, the smaller they are)
+//! mirror = false
 //! two_sided = false           # whether the backs of its faces are there, too, whatever its model or --two-sided says
 //!
 //! [[camera]]                  # the first is the one that pictures are taken with
@@ -23,6 +26,14 @@
 //! target = [300, 400, 100]
 //! up = [0, 0, 1]              # the scene's
 //! fov = 60                    # degrees, the full vertical angle (60)
+//!
+//! [[light]]                   # without a surface, for pictures along rays; no bake knows it
+//! position = [200, 200, 250]  # with an intensity, a number or red, green, blue
+//! intensity = 40              # W/sr
+//!
+//! [[light]]
+//! towards = [0, 0.5, 1]       # the direction of a light that is far away
+//! irradiance = [3, 3, 2.5]    # W/m² on a surface that faces it
 //! ```
 //!
 //! A key that is not listed here is an error.
@@ -33,7 +44,7 @@ use std::fs;
 use std::path::Path;
 
 use glam::{DMat3, DMat4, DVec3};
-use scene::{Camera, NamedCamera, Rgb};
+use scene::{Camera, Gloss, Light, NamedCamera, Rgb};
 use serde::Deserialize;
 use toml::Spanned;
 
@@ -57,6 +68,8 @@ struct SceneFile {
     material: BTreeMap<String, Spanned<MaterialEntry>>,
     #[serde(default)]
     camera: Vec<Spanned<CameraEntry>>,
+    #[serde(default)]
+    light: Vec<Spanned<LightEntry>>,
 }
 
 #[derive(Deserialize)]
@@ -77,6 +90,9 @@ struct ModelEntry {
 struct MaterialEntry {
     reflectance: Option<OneOrThree>,
     radiance: Option<OneOrThree>,
+    specular: Option<OneOrThree>,
+    exponent: Option<f64>,
+    mirror: Option<bool>,
     two_sided: Option<bool>,
 }
 
@@ -88,6 +104,15 @@ struct CameraEntry {
     target: [f64; 3],
     up: Option<[f64; 3]>,
     fov: Option<f64>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct LightEntry {
+    position: Option<[f64; 3]>,
+    intensity: Option<OneOrThree>,
+    towards: Option<[f64; 3]>,
+    irradiance: Option<OneOrThree>,
 }
 
 #[derive(Clone, Copy, Deserialize)]
@@ -186,6 +211,9 @@ pub(crate) fn read_scene_file(path: &Path, report: &mut ImportReport) -> Result<
     for entry in &file.camera {
         cameras.push(camera(entry.get_ref(), scene.up.unwrap_or(DVec3::Y), unit).map_err(wrong(entry.span().start))?);
     }
+    for entry in &file.light {
+        scene.lights.push(light(entry.get_ref(), unit).map_err(wrong(entry.span().start))?);
+    }
     cameras.append(&mut scene.cameras);
     unique_names(&mut cameras);
     scene.cameras = cameras;
@@ -250,6 +278,10 @@ fn change(scene: &mut Model, name: &str, entry: &MaterialEntry) -> Result<(), Wr
     };
     let reflectance = colour(entry.reflectance, "reflectance", 1.0)?;
     let radiance = colour(entry.radiance, "radiance", f64::MAX)?;
+    let specular = colour(entry.specular, "specular reflectance", 1.0)?;
+    if entry.exponent.is_some_and(|exponent| !exponent.is_finite() || exponent < 0.0) {
+        return Err(("an exponent of highlights below 0".to_owned(), "write a number from 0 up, such as 50"));
+    }
     for &id in &ids {
         let material = &mut scene.materials[id as usize];
         if let Some(reflectance) = reflectance {
@@ -257,11 +289,41 @@ fn change(scene: &mut Model, name: &str, entry: &MaterialEntry) -> Result<(), Wr
             material.texture = None;
         }
         material.radiance = radiance.unwrap_or(material.radiance);
+        let diffuse = reflectance.or(material.gloss.map(|gloss| gloss.diffuse)).unwrap_or(material.reflectance);
+        let dull = Gloss { diffuse, specular: Rgb::ZERO, exponent: 0.0, is_mirror: false };
+        let mut gloss = Gloss { diffuse, ..material.gloss.unwrap_or(dull) };
+        gloss.specular = specular.unwrap_or(gloss.specular);
+        gloss.exponent = entry.exponent.unwrap_or(gloss.exponent);
+        gloss.is_mirror = entry.mirror.unwrap_or(gloss.is_mirror);
+        let shines = gloss.specular != Rgb::ZERO && (gloss.is_mirror || gloss.exponent > 0.0);
+        material.gloss = shines.then_some(gloss);
+        if shines && gloss.is_mirror {
+            // As with other mirrors: a bake takes all that it reflects for diffuse.
+            material.reflectance = (diffuse + gloss.specular).min(Rgb::splat(LARGEST_REFLECTANCE));
+        }
     }
     if let Some(two_sided) = entry.two_sided {
         scene.two_sided.extend(ids.iter().map(|&id| (id, two_sided)));
     }
     Ok(())
+}
+
+fn light(entry: &LightEntry, unit: f64) -> Result<Light, Wrong> {
+    let colour = |values: Option<OneOrThree>| values.map(OneOrThree::vector);
+    let light = match (entry.position, colour(entry.intensity), entry.towards, colour(entry.irradiance)) {
+        (Some(position), Some(intensity), None, None) => {
+            Some(Light::Point { position: DVec3::from(position) * unit, intensity })
+        }
+        (None, None, Some(towards), Some(irradiance)) => {
+            Some(Light::Directional { direction: DVec3::from(towards).normalize_or_zero(), irradiance })
+        }
+        _ => None,
+    };
+    light.filter(Light::is_valid).ok_or_else(|| {
+        let cause =
+            "no light: it has neither a position and an intensity, nor a direction and an irradiance".to_owned();
+        (cause, "give position and intensity, or towards and irradiance, in finite numbers, light from 0 up")
+    })
 }
 
 fn camera(entry: &CameraEntry, up: DVec3, unit: f64) -> Result<NamedCamera, Wrong> {
@@ -326,6 +388,12 @@ mod tests {
             ),
             ("[[model]]\nfile = \"a.obj\"\n[[camera]]\nname = \"c\"\neye = [0, 0]\n", 5, ""),
             ("[[model]\n", 1, ""),
+            ("[[model]]\nfile = \"a.obj\"\n[material.paint]\nspecular = 2\n", 3, "a specular reflectance of"),
+            ("[[model]]\nfile = \"a.obj\"\n[material.paint]\nexponent = -1\n", 3, "an exponent"),
+            ("[[model]]\nfile = \"a.obj\"\n[[light]]\nposition = [0, 0, 1]\n", 3, "no light"),
+            ("[[model]]\nfile = \"a.obj\"\n[[light]]\nposition = [0, 0, 1]\nirradiance = 1\n", 3, "no light"),
+            ("[[model]]\nfile = \"a.obj\"\n[[light]]\ntowards = [0, 0, 0]\nirradiance = 1\n", 3, "no light"),
+            ("[[model]]\nfile = \"a.obj\"\n[[light]]\ntowards = [0, 0, 1]\nirradiance = -1\n", 3, "no light"),
         ] {
             let message = read(text).unwrap_err();
             assert!(message.starts_with(&format!("room.toml, line {line}: ")), "{text:?}: {message}");
@@ -374,6 +442,28 @@ mod tests {
         assert_eq!(two.polygons.len(), 3);
         assert_eq!(scene::other_sides(&two), [None, Some(2), Some(1)]);
         assert_eq!(scene("[material.lamp]\ntwo_sided = false\n").polygons.len(), 2);
+    }
+
+    #[test]
+    fn mirrors_highlights_and_lights_stand_beside_what_is_diffuse() {
+        let scene = |text: &str| read(&format!("units = \"cm\"\n{MODEL}{text}")).unwrap().scene;
+        let glossy = scene("[material.paint]\nspecular = 0.2\nexponent = 50\n");
+        let gloss = Gloss { diffuse: Rgb::splat(0.5), specular: Rgb::splat(0.2), exponent: 50.0, is_mirror: false };
+        assert_eq!((glossy.material(0).gloss, glossy.material(0).reflectance), (Some(gloss), Rgb::splat(0.5)));
+        let mirror = scene("[material.paint]\nreflectance = 0.1\nspecular = 0.8\nmirror = true\n").materials.remove(0);
+        assert!(mirror.gloss.is_some_and(|gloss| gloss.is_mirror && gloss.diffuse == Rgb::splat(0.1)));
+        assert!((mirror.reflectance - Rgb::splat(0.9)).length() < 1e-12);
+        // Neither a mirror nor an exponent: nothing is seen of it.
+        assert_eq!(scene("[material.paint]\nspecular = 0.2\n").material(0).gloss, None);
+        let lights = "[[light]]\nposition = [100, 0, 0]\nintensity = 40\n\
+                      [[light]]\ntowards = [0, 0, 4]\nirradiance = [1, 2, 3]\n";
+        assert_eq!(
+            scene(lights).lights,
+            [
+                Light::Point { position: DVec3::X, intensity: Rgb::splat(40.0) },
+                Light::Directional { direction: DVec3::Z, irradiance: Rgb::new(1.0, 2.0, 3.0) },
+            ]
+        );
     }
 
     #[test]

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use glam::{DVec3, Vec2, Vec3};
 use serde::{Deserialize, Serialize};
 
-use crate::{Material, NamedCamera, Plane, Polygon, Rgb, Texture, area_vector};
+use crate::{Gloss, Light, Material, NamedCamera, Plane, Polygon, Rgb, Texture, area_vector};
 
 /// Largest coordinate accepted, metres. Beyond it f32 positions in a viewer would be off by more than a
 /// centimetre, and nobody models a room there on purpose: the units are wrong.
@@ -36,6 +36,8 @@ pub struct Scene {
     pub objects: Vec<String>,
     /// Cameras stored with the scene; the first is the default one.
     pub cameras: Vec<NamedCamera>,
+    /// Lights that are no surfaces; bakes know none of them.
+    pub lights: Vec<Light>,
 }
 
 /// What is wrong with a scene as data.
@@ -144,7 +146,8 @@ impl Scene {
             let reflects = material.reflectance.is_finite()
                 && material.reflectance.min_element() >= 0.0
                 && material.reflectance.max_element() <= 1.0;
-            if !reflects || !material.radiance.is_finite() || material.radiance.min_element() < 0.0 {
+            let shines = material.gloss.as_ref().is_none_or(Gloss::is_valid);
+            if !reflects || !shines || !material.radiance.is_finite() || material.radiance.min_element() < 0.0 {
                 return Err(SceneError::Number(format!("material {i} ({})", material.name)));
             }
         }
@@ -166,8 +169,12 @@ impl Scene {
                 return Err(SceneError::Number(format!("camera {}", named.name)));
             }
         }
-        Ok(())
+        match self.lights.iter().position(|light| !light.is_valid()) {
+            Some(i) => Err(SceneError::Number(format!("light {i}"))),
+            None => Ok(()),
+        }
     }
+
     fn validate_textures(&self) -> Result<(), SceneError> {
         if let Some(i) = self.textures.iter().position(|texture| !texture.is_valid()) {
             return Err(SceneError::Index(format!("the size of texture {i}")));

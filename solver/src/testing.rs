@@ -17,6 +17,7 @@ impl Builder {
             reflectance: Rgb::splat(reflectance),
             texture: None,
             radiance: Rgb::splat(radiance),
+            gloss: None,
         });
         self
     }

@@ -45,7 +45,13 @@ impl Room {
     /// A material that reflects `reflectance` and emits the exitance `exitance`, W·m⁻²; polygons that follow are made of it.
     pub fn material(mut self, reflectance: Rgb, exitance: Rgb) -> Self {
         let name = format!("material {}", self.0.materials.len());
-        self.0.materials.push(Material { name, reflectance, texture: None, radiance: exitance / std::f64::consts::PI });
+        self.0.materials.push(Material {
+            name,
+            reflectance,
+            texture: None,
+            radiance: exitance / std::f64::consts::PI,
+            gloss: None,
+        });
         self
     }
 

@@ -157,6 +157,25 @@ fn materials_are_read_and_what_is_wrong_with_them_is_said() {
     }
 }
 
+/// What a bake makes diffuse stands beside it for those who look along rays.
+#[test]
+fn mirrors_and_highlights_are_kept_beside_the_reflectance() {
+    let gloss = |lines: &str| {
+        let (obj, mtl) = (format!("mtllib room.mtl\n{SQUARE}usemtl a\nf 1 2 3 4\n"), format!("newmtl a\n{lines}\n"));
+        let material = read(obj.as_bytes(), mtl.as_bytes()).unwrap().scene.materials.remove(0);
+        (material.reflectance.x, material.gloss.map(|g| (g.diffuse.x, g.specular.x, g.exponent, g.is_mirror)))
+    };
+    assert_eq!(gloss("Kd 0.5\nKs 0.25\nNs 60"), (0.5, Some((0.5, 0.25, 60.0, false))));
+    assert_eq!(gloss("Kd 0.5\nKs 0.25\nNs 60\nillum 2"), (0.5, Some((0.5, 0.25, 60.0, false))));
+    assert_eq!(gloss("Kd 0.5\nKs 0.25\nillum 5"), (0.75, Some((0.5, 0.25, 0.0, true))));
+    assert_eq!(gloss("Kd 0\nKs 0.25\nNs 9"), (0.25, Some((0.0, 0.25, 9.0, false))));
+    assert_eq!(gloss("Kd 3\nKs 7\nNs 1e3\nillum 3"), (0.999, Some((0.999, 1.0, 1000.0, true))));
+    for dull in ["Kd 0.5\nKs 0.25\nNs 60\nillum 1", "Kd 0.5\nKs 0.25", "Kd 0.5\nKs 0\nNs 60", "Kd 0.5\nKs 0.25\nNs nan"]
+    {
+        assert_eq!(gloss(dull), (0.5, None), "{dull}");
+    }
+}
+
 #[test]
 fn a_wrong_line_of_the_materials_is_an_error_in_that_file() {
     let obj = format!("mtllib room.mtl\n{SQUARE}f 1 2 3\n");
@@ -254,7 +273,7 @@ proptest! {
     #[test]
     fn lines_that_look_like_a_scene_do_not_panic(
         lines in proptest::collection::vec("(v|f|vt|vn|g|o|usemtl|mtllib|l|#|\\\\|# camera eye)( [-0-9./ae]{1,6}){0,5}", 0..40),
-        mtl in proptest::collection::vec("(newmtl|Kd|Ke|map_Kd|illum|bump)( [-0-9.a]{1,4}){0,4}", 0..10),
+        mtl in proptest::collection::vec("(newmtl|Kd|Ke|Ks|Ns|map_Kd|illum|bump)( [-0-9.a]{1,4}){0,4}", 0..10),
     ) {
         let obj = format!("mtllib room.mtl\n{SQUARE}f 1 2 3\n{}", lines.join("\n"));
         if let Ok(imported) = read(obj.as_bytes(), mtl.join("\n").as_bytes()) {
