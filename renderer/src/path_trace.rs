@@ -16,7 +16,7 @@ use scene::{Bvh, Rgb, Scene};
 
 use crate::{
     emitters::{Emitters, SeenEmitters},
-    sequence::{Kronecker, Stream},
+    sequence::{Kronecker, Stream, scatter},
     surface::{Receiver, SurfacePoint, Surfaces},
 };
 
@@ -98,6 +98,39 @@ pub fn irradiance_on(
     points.par_iter().zip(samples).enumerate().map(estimate).collect()
 }
 
+/// Irradiance by a few paths at a time, for pictures: an estimate that is right on average, and as noisy as its paths are few.
+pub struct PathLight<'a> {
+    tracer: PathTracer<'a>,
+    options: PathOptions,
+}
+
+impl<'a> PathLight<'a> {
+    /// Paths in a valid scene, as many a point as the options say, at least one; `bvh` is [`Bvh::of_scene`] of it.
+    pub fn new(scene: &'a Scene, bvh: &'a Bvh, options: PathOptions) -> Self {
+        Self { tracer: PathTracer::new(scene, bvh), options }
+    }
+
+    /// Irradiance at a point of a surface, by its shading normal if any, W·m⁻². The same point has the same paths.
+    pub fn irradiance(&self, point: &SurfacePoint) -> Rgb {
+        let PathOptions { samples, bounces, seed } = self.options;
+        let number = point.position.to_array().into_iter().fold(0, |number, x| scatter(number, x.to_bits()));
+        let receiver = self.tracer.surfaces.looked_at(point);
+        let mut seen = [SeenEmitters::default(), SeenEmitters::default()];
+        self.tracer.emitters.seen_from(&self.tracer.surfaces, &receiver, &mut seen[0]);
+        self.tracer.batch(
+            &receiver,
+            (samples.max(1), bounces.unwrap_or(u32::MAX)),
+            &mut seen,
+            &mut Stream::new(seed, number),
+        )
+    }
+
+    /// Paths a point.
+    pub fn paths(&self) -> u32 {
+        self.options.samples.max(1)
+    }
+}
+
 /// A scene, ready for paths.
 pub(crate) struct PathTracer<'a> {
     pub surfaces: Surfaces<'a>,
@@ -116,24 +149,33 @@ impl<'a> PathTracer<'a> {
         let samples = options.samples.div_ceil(BATCHES).max(1);
         let bounces = options.bounces.unwrap_or(u32::MAX);
         let mut stream = Stream::new(options.seed, stream);
-        let (mut here, mut there) = (SeenEmitters::default(), SeenEmitters::default());
-        self.emitters.seen_from(&self.surfaces, receiver, &mut here);
-        let batch = |_| {
-            let mut on_emitters = Kronecker::<2>::shifted_by(&mut stream);
-            let mut first_bounce = Kronecker::<4>::shifted_by(&mut stream);
-            let mut sum = Rgb::ZERO;
-            for _ in 0..samples {
-                sum += self.emitters.irradiance(&self.surfaces, receiver, &here, on_emitters.point());
-                if bounces > 0 {
-                    sum += self.reflected(receiver, bounces, first_bounce.point(), &mut there, &mut stream);
-                }
-            }
-            sum / f64::from(samples)
-        };
+        let mut seen = [SeenEmitters::default(), SeenEmitters::default()];
+        self.emitters.seen_from(&self.surfaces, receiver, &mut seen[0]);
+        let batch = |_| self.batch(receiver, (samples, bounces), &mut seen, &mut stream);
         let batches: Vec<Rgb> = (0..BATCHES).map(batch).collect();
         let mean = batches.iter().sum::<Rgb>() / f64::from(BATCHES);
         let squares: Rgb = batches.iter().map(|batch| (batch - mean) * (batch - mean)).sum();
         Estimate { mean, variance: squares / f64::from(BATCHES * (BATCHES - 1)) }
+    }
+
+    /// The mean of some samples that are spread evenly among themselves. Of the emitters seen, the first are those from the receiver.
+    fn batch(
+        &self,
+        receiver: &Receiver,
+        (samples, bounces): (u32, u32),
+        [here, there]: &mut [SeenEmitters; 2],
+        stream: &mut Stream,
+    ) -> Rgb {
+        let mut on_emitters = Kronecker::<2>::shifted_by(stream);
+        let mut first_bounce = Kronecker::<4>::shifted_by(stream);
+        let mut sum = Rgb::ZERO;
+        for _ in 0..samples {
+            sum += self.emitters.irradiance(&self.surfaces, receiver, here, on_emitters.point());
+            if bounces > 0 {
+                sum += self.reflected(receiver, bounces, first_bounce.point(), there, stream);
+            }
+        }
+        sum / f64::from(samples)
     }
 
     /// One sample of the irradiance that reaches a receiver by way of one to `bounces` reflections, W·m⁻². The first
@@ -268,6 +310,28 @@ mod tests {
         let dark = scene_of(&[(ceiling([0., 1.], [0., 1.], 0.5), grey(1.0, 0.0))]);
         assert_eq!(trace(&dark, &points, &options(0, None)), vec![Estimate::default(); 2]);
         assert_eq!(trace(&dark, &[], &options(0, None)), vec![]);
+    }
+
+    /// A few paths at each of many points scatter about what many paths at one of them say.
+    #[test]
+    fn a_few_paths_are_right_on_average() {
+        let mut faces: Vec<_> = room(DVec3::ZERO, DVec3::ONE).into_iter().map(|face| (face, grey(0.5, 0.0))).collect();
+        faces[1].1 = grey(0.0, 4.0);
+        let scene = scene_of(&faces);
+        let bvh = Bvh::of_scene(&scene);
+        let light = PathLight::new(&scene, &bvh, PathOptions { samples: 1, bounces: None, seed: 5 });
+        let point = |i: i32| SurfacePoint {
+            position: DVec3::new(0.4 + f64::from(i) * 1e-8, 0.5, 0.0),
+            normal: DVec3::Z,
+            polygon: 0,
+        };
+        assert_eq!(light.irradiance(&point(3)), light.irradiance(&point(3)));
+        let few: Vec<f64> = (0..20_000).map(|i| light.irradiance(&point(i)).x).collect();
+        let mean = few.iter().sum::<f64>() / few.len() as f64;
+        let variance = few.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / few.len() as f64;
+        let truth = trace(&scene, &[(point(0).position, DVec3::Z)], &options(1 << 16, None))[0];
+        let error = (variance / few.len() as f64 + truth.variance.x).sqrt();
+        assert!((mean - truth.mean.x).abs() < 4.5 * error && error < 0.01 * mean, "{mean} ± {error}: {truth:?}");
     }
 
     #[test]

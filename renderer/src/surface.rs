@@ -57,13 +57,15 @@ pub(crate) struct Surfaces<'a> {
     other_sides: Vec<Option<u32>>,
     /// Lengths up to this are rounding, metres.
     pub rounding: f64,
+    /// Length of the diagonal of the scene's box, metres.
+    pub size: f64,
 }
 
 impl<'a> Surfaces<'a> {
     pub fn new(scene: &'a Scene, bvh: &'a Bvh) -> Self {
         let planes: Vec<_> = scene.polygon_ids().map(|polygon| scene.plane(polygon)).collect();
-        let other_sides = other_sides(scene);
-        Self { scene, bvh, planes, other_sides, rounding: ROUNDING * scene.size() }
+        let (other_sides, size) = (other_sides(scene), scene.size());
+        Self { scene, bvh, planes, other_sides, rounding: ROUNDING * size, size }
     }
 
     pub fn plane(&self, polygon: u32) -> Plane {
@@ -95,7 +97,7 @@ impl<'a> Surfaces<'a> {
     /// normal, in its plane, or in empty space.
     pub fn receiver_at(&self, position: DVec3, normal: DVec3) -> Receiver {
         let normal = normal.normalize_or_zero();
-        match self.bvh.nearest_surface(position, normal, REACH * self.scene.size()) {
+        match self.bvh.nearest_surface(position, normal, REACH * self.size) {
             None => Receiver { position, normal, cosine: normal, polygon: None },
             Some(hit) => {
                 let plane = self.plane(hit.id);
@@ -105,6 +107,11 @@ impl<'a> Surfaces<'a> {
         }
     }
 
+    /// The polygon that a ray meets on its front: the one that it hits, or that one's other side. None if it meets a black back.
+    pub fn facing(&self, hit: u32, direction: DVec3) -> Option<u32> {
+        if self.plane(hit).normal.dot(direction) < 0.0 { Some(hit) } else { self.other_sides[hit as usize] }
+    }
+
     /// The surface that a receiver sees in a direction: none where the ray leaves the scene or meets a black back.
     ///
     /// No offset along the ray keeps it off its own surface, since that would see through a contact: a convex polygon
@@ -112,8 +119,7 @@ impl<'a> Surfaces<'a> {
     pub fn seen_from(&self, receiver: &Receiver, direction: DVec3) -> Option<SurfacePoint> {
         let ray = Ray { origin: receiver.position, direction };
         let hit = self.bvh.closest_hit_among(&ray, |id| !self.is_on(receiver, id))?;
-        let front = self.plane(hit.id).normal.dot(direction) < 0.0;
-        let polygon = if front { hit.id } else { self.other_sides[hit.id as usize]? };
+        let polygon = self.facing(hit.id, direction)?;
         let plane = self.plane(polygon);
         let position = ray.at(hit.distance);
         let position = position - plane.normal * plane.distance(position);
