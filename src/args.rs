@@ -13,6 +13,10 @@ use viewer::Mode;
 
 use crate::failure::Usage;
 
+mod render;
+
+pub use render::{Budget, RadianceChoice, RadianceFlags, RenderFlags, SamplerChoice};
+
 /// Largest side of a picture, pixels: what every GPU of the last ten years takes as a texture.
 const LARGEST_SIDE: u32 = 16_384;
 
@@ -41,6 +45,8 @@ pub enum Command {
     Bake(BakeFlags),
     /// Draw a picture
     Shot(ShotFlags),
+    /// Make a picture from samples of the image plane, each along a ray
+    Render(RenderFlags),
     /// Walk through the light in a window
     View(ViewFlags),
     /// Print the irradiance at points

@@ -14,8 +14,11 @@ mod interrupt;
 mod memory;
 mod output;
 mod pipeline;
+mod point_gather;
 mod probe;
 mod progress;
+mod radiance;
+mod render;
 mod report;
 mod resume;
 mod shot;
@@ -71,6 +74,7 @@ fn run(command: Command) -> Result<Outcome> {
     match command {
         Command::Bake(flags) => bake::run(&flags, &outputs, &interrupt),
         Command::Shot(flags) => shot::run(&flags, &outputs),
+        Command::Render(flags) => render::run(&flags, &outputs, &interrupt),
         Command::View(flags) => view::run(&flags, &outputs),
         Command::Probe(flags) => probe::run(&flags, &outputs),
         Command::Verify(flags) => verify::run(&flags, &outputs),

@@ -92,7 +92,7 @@ pub fn run(flags: &ProbeFlags, outputs: &Outputs) -> Result<Outcome> {
 }
 
 /// The options that bake a bake's scene again as it was baked, with the bounces asked for instead of its own.
-fn as_baked(provenance: &Provenance, asked: &LightFlags) -> LightFlags {
+pub fn as_baked(provenance: &Provenance, asked: &LightFlags) -> LightFlags {
     let made = pipeline::light_flags(provenance);
     LightFlags { bounces: asked.bounces.or(made.bounces), ..made }
 }

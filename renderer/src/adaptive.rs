@@ -23,7 +23,7 @@ use crate::cell::{Cell, Halves, MOST_PIXELS, pixels};
 use crate::confidence::{Confidence, Interval};
 use crate::evaluation::{Evaluation, Evaluator};
 use crate::film::Tile;
-use crate::kd_tree::{KdTree, MOST_SAMPLES, Sample, Slot, Visit};
+use crate::kd_tree::{KdTree, MOST_SAMPLES, Slot, Visit};
 use crate::sequence::scatter;
 use crate::survey::{Part, Rule, Survey, external_variance};
 
@@ -54,7 +54,7 @@ pub struct AdaptiveOptions {
     pub level: f64,
     /// How far from the truth a pixel's mean may be.
     pub interval: Interval,
-    /// What a picture shows as bright.
+    /// How bright the picture is made: samples are compared as a display shows them.
     pub exposure: Exposure,
 }
 
@@ -102,13 +102,13 @@ impl AdaptiveSampler {
         let place = jittered(&whole, size, options.seed);
         let radiance = evaluate(pixels(place)).radiance;
         let is_number = radiance.is_finite();
-        let first = Sample { place, radiance: if is_number { radiance } else { Vec3::ZERO } };
+        let first = if is_number { radiance } else { Vec3::ZERO };
         Some(Self {
             size,
             seed: options.seed,
             rule: options.rule,
             confidence: Confidence::new(options.level, options.interval),
-            tree: KdTree::new(size, options.exposure.factor(), first),
+            tree: KdTree::new(size, options.exposure, place, first),
             batch: Vec::new(),
             closed: 0,
             excluded: u64::from(!is_number),
@@ -131,8 +131,8 @@ impl AdaptiveSampler {
         self.batch.iter().map(|parting| pixels(parting.place)).collect()
     }
 
-    /// Takes what is seen at the points of the last batch, or at the first of them. What changed: cells, each with what its radiance
-    /// is more than before.
+    /// Takes what is seen at the points of the last batch, or at the first of them. What changed: the cells with another radiance than
+    /// before.
     ///
     /// Radiance that is no finite number is excluded: the cell keeps what it had before.
     pub fn take(&mut self, seen: &[Evaluation]) -> Vec<Tile> {
@@ -142,9 +142,8 @@ impl AdaptiveSampler {
             let is_number = evaluation.radiance.is_finite();
             self.excluded += u64::from(!is_number);
             let radiance = if is_number { evaluation.radiance } else { before };
-            nodes.push(self.tree.part(parting.slot, parting.side, Sample { place: parting.place, radiance }));
-            let bounds = parting.half.bounds(self.size);
-            changes.push(Tile { bounds, radiance: radiance.as_dvec3() - before.as_dvec3() });
+            nodes.push(self.tree.part(parting.slot, parting.side, parting.place, radiance));
+            changes.push(Tile { bounds: parting.half.bounds(self.size), radiance, before });
         }
         self.tree.update(nodes);
         changes
@@ -179,7 +178,7 @@ impl AdaptiveSampler {
     pub fn tiles(&self) -> Vec<Tile> {
         let mut tiles = Vec::with_capacity(self.samples());
         self.tree.leaves(&mut |cell, sample| {
-            tiles.push(Tile { bounds: cell.bounds(self.size), radiance: sample.radiance.as_dvec3() });
+            tiles.push(Tile { bounds: cell.bounds(self.size), radiance: sample.radiance, before: Vec3::ZERO });
         });
         tiles
     }
@@ -283,7 +282,7 @@ fn keep_largest(open: &mut Vec<(f32, Slot, Cell)>, most: usize, seed: u64) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Film, Filter};
+    use crate::{Film, Filter, shown};
 
     const OPTIONS: AdaptiveOptions = AdaptiveOptions {
         seed: 1,
@@ -313,11 +312,11 @@ mod tests {
         }
     }
 
-    /// The mean of the disk's picture over a pixel, by 64 × 64 points, which is good to 1e-3.
+    /// The mean of what is shown of the disk over a pixel, by 64 × 64 points, which is good to 1e-3.
     fn truth(pixel: usize, width: u32) -> Vec3 {
         let corner = DVec2::new((pixel % width as usize) as f64, (pixel / width as usize) as f64);
         let place = |i: u32| corner + (DVec2::new(f64::from(i % 64), f64::from(i / 64)) + 0.5) / 64.0;
-        (0..4096).map(|i| disk(place(i)).radiance).sum::<Vec3>() / 4096.0
+        (0..4096).map(|i| shown(disk(place(i)).radiance, OPTIONS.exposure)).sum::<Vec3>() / 4096.0
     }
 
     #[test]
@@ -331,7 +330,10 @@ mod tests {
     fn one_pixel_is_a_picture() {
         let sampler = refined((1, 1), &OPTIONS, 100, &|_| Evaluation { radiance: Vec3::ONE, object: 1, cost: 1 });
         assert_eq!((sampler.samples(), sampler.closed_share()), (1, 1.0));
-        assert_eq!(sampler.tiles(), [Tile { bounds: [DVec2::ZERO, DVec2::ONE], radiance: Vec3::ONE.as_dvec3() }]);
+        assert_eq!(
+            sampler.tiles(),
+            [Tile { bounds: [DVec2::ZERO, DVec2::ONE], radiance: Vec3::ONE, before: Vec3::ZERO }]
+        );
     }
 
     #[test]
@@ -350,7 +352,7 @@ mod tests {
     fn samples_gather_at_the_border_and_means_are_right() {
         let sampler = refined((48, 32), &OPTIONS, usize::MAX, &disk);
         assert_eq!(sampler.closed_share(), 1.0);
-        let mut film = Film::new(48, 32, Filter::Box);
+        let mut film = Film::new(48, 32, Filter::Box, Some(OPTIONS.exposure));
         film.add(&sampler.tiles());
         let (counts, picture) = (sampler.samples_per_pixel(), film.picture());
         let mut off = 0;
@@ -370,7 +372,7 @@ mod tests {
         let cost_and_error = |level: f64, interval: f64, rule: Rule| {
             let options = AdaptiveOptions { level, interval: Interval::Linear(interval), rule, ..OPTIONS };
             let sampler = refined((48, 32), &options, usize::MAX, &disk);
-            let mut film = Film::new(48, 32, Filter::Box);
+            let mut film = Film::new(48, 32, Filter::Box, Some(OPTIONS.exposure));
             film.add(&sampler.tiles());
             let square = |(pixel, value): (usize, Vec3)| (value - truth(pixel, 48)).length_squared();
             let squares: f32 = film.picture().into_iter().enumerate().map(square).sum();
@@ -405,7 +407,7 @@ mod tests {
         };
         for filter in [Filter::Lanczos, Filter::Mitchell] {
             let mut sampler = AdaptiveSampler::new(48, 32, &OPTIONS, &evaluate).expect("the size is one");
-            let (mut running, mut whole) = (Film::new(48, 32, filter), Film::new(48, 32, filter));
+            let (mut running, mut whole) = (Film::new(48, 32, filter, None), Film::new(48, 32, filter, None));
             running.add(&sampler.tiles());
             loop {
                 let batch = sampler.next_batch(usize::MAX);
@@ -439,7 +441,7 @@ mod tests {
         let nothing =
             refined((8, 8), &OPTIONS, usize::MAX, &|_| Evaluation { radiance: Vec3::NAN, ..holes(DVec2::ONE) });
         assert_eq!((nothing.excluded(), nothing.samples()), (64, 64));
-        assert!(nothing.tiles().iter().all(|tile| tile.radiance == scene::Rgb::ZERO));
+        assert!(nothing.tiles().iter().all(|tile| tile.radiance == Vec3::ZERO));
     }
 
     /// A lamp far brighter than white takes no more samples for it.

@@ -4,17 +4,15 @@
 use std::f64::consts::FRAC_PI_2;
 
 use glam::Vec3A;
-use scene::{encode_srgb, tone_curve};
+use scene::encode_srgb;
 
-use crate::kd_tree::WHITE;
-
-/// How far from the truth the mean of a pixel may be.
+/// How far from the truth the mean of a pixel may be, of what a display shows at most, 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Interval {
-    /// In exposed radiance, of which 1 is what a display without a tone curve shows as white.
+    /// In the light that a display shows; behind the tone curve it is wide in highlights.
     Linear(f64),
-    /// In what a display shows, 0..=1, behind the tone curve and the transfer function: narrow in the dark, wide in highlights.
-    Shown(f64),
+    /// In what an eye makes of that light, behind the transfer function: narrow in the dark, too.
+    Perceptual(f64),
 }
 
 /// Degrees of freedom from which on the distribution is taken for that of as many: the quantile at 99 % is 2 % above the
@@ -28,7 +26,7 @@ const STEPS: usize = 1024;
 pub(crate) struct Confidence {
     /// Student's t, by degrees of freedom.
     quantiles: Vec<f32>,
-    /// Largest half width of the interval of confidence, exposed, by the mean.
+    /// Largest half width of the interval of confidence, by the mean.
     widths: Vec<f32>,
 }
 
@@ -36,7 +34,7 @@ impl Confidence {
     /// With a level between 0 and 1, such as 0.99, and an interval above 0.
     pub fn new(level: f64, interval: Interval) -> Self {
         let quantiles = (0..=MOST_DEGREES as u32).map(|degrees| student_t(level, degrees) as f32).collect();
-        let mean = |step: usize| WHITE * (step as f32 / STEPS as f32).powi(2);
+        let mean = |step: usize| (step as f32 / STEPS as f32).powi(2);
         let widths = (0..=STEPS).map(|step| interval.half_width(mean(step))).collect();
         Self { quantiles, widths }
     }
@@ -44,7 +42,7 @@ impl Confidence {
     /// Whether a mean with a variance, that of the channel where it is largest, is known well enough.
     pub fn holds(&self, mean: Vec3A, variance: f32, degrees: f32) -> bool {
         let quantile = self.quantiles[(degrees as usize).min(MOST_DEGREES)];
-        let step = |channel: f32| ((channel / WHITE).max(0.0).sqrt() * STEPS as f32) as usize;
+        let step = |channel: f32| (channel.max(0.0).sqrt() * STEPS as f32) as usize;
         let width = |channel: f32| {
             let step = step(channel).min(STEPS - 1);
             self.widths[step].min(self.widths[step + 1])
@@ -56,20 +54,21 @@ impl Confidence {
 }
 
 impl Interval {
-    /// The largest distance from a mean, both exposed, at which what is shown differs by no more than the interval.
+    /// The largest distance from a mean at which light differs by no more than the interval.
     fn half_width(self, mean: f32) -> f32 {
-        let (shown, interval) = match self {
+        let interval = match self {
             Self::Linear(interval) => return interval as f32,
-            Self::Shown(interval) => (|exposed: f32| encode_srgb(tone_curve(exposed)), interval as f32),
+            Self::Perceptual(interval) => interval as f32,
         };
+        let seen = encode_srgb;
         let within =
-            |width: f32| shown(mean + width) - shown(mean) <= interval && shown(mean) - shown(mean - width) <= interval;
-        // A bisection of the width, which is a number between nothing and all that is told apart.
+            |width: f32| seen(mean + width) - seen(mean) <= interval && seen(mean) - seen(mean - width) <= interval;
+        // A bisection of the width, which is a number between nothing and all that is shown.
         let halve = |(low, high): (f32, f32), _| {
             let middle = (low + high) / 2.0;
             if within(middle) { (middle, high) } else { (low, middle) }
         };
-        (0..32).fold((0.0, 2.0 * WHITE), halve).0
+        (0..32).fold((0.0, 1.0), halve).0
     }
 }
 
@@ -133,17 +132,17 @@ mod tests {
         assert!(confidence.holds(Vec3A::ONE, half(2.63), 1e9) && !confidence.holds(Vec3A::ONE, half(2.62), 1e9));
     }
 
-    /// A step of what is shown is a small step of radiance in the dark, and a large one in highlights.
+    /// A step of what an eye sees is a small step of light in the dark, and a large one in highlights.
     #[test]
-    fn an_interval_of_what_is_shown_follows_the_tone_curve() {
-        let interval = Interval::Shown(1.0 / 255.0);
-        for mean in [0.0, 0.01, 0.18, 0.6, 1.0, 3.0] {
+    fn a_perceptual_interval_follows_the_transfer_function() {
+        let interval = Interval::Perceptual(1.0 / 255.0);
+        for mean in [0.0, 0.01, 0.18, 0.6, 1.0] {
             let width = interval.half_width(mean);
-            let shown = |exposed: f32| encode_srgb(tone_curve(exposed)) * 255.0;
-            let change = (shown(mean + width) - shown(mean)).max(shown(mean) - shown(mean - width));
+            let seen = |light: f32| encode_srgb(light) * 255.0;
+            let change = (seen(mean + width) - seen(mean)).max(seen(mean) - seen(mean - width));
             assert!((change - 1.0).abs() < 1e-2, "{change} at {mean}");
         }
-        let widths = [0.0, 0.01, 0.1, 0.5, 1.0, 2.0].map(|mean| interval.half_width(mean));
+        let widths = [0.0, 0.01, 0.1, 0.5, 1.0].map(|mean| interval.half_width(mean));
         assert!(widths.is_sorted(), "{widths:?}");
         let confidence = Confidence::new(0.99, interval);
         let variance = (0.003_f32 / 3.4).powi(2);

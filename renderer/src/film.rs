@@ -2,12 +2,16 @@
 //! each pixel makes of them, by equation 3.1.
 //!
 //! A film is a running sum. Cells are added to it all at once, or as they change: the sums are the same, to the rounding of f64.
+//!
+//! What we do differently: of a picture for a display, the light that the display shows of each cell is filtered, not the cell's
+//! radiance. A lamp is hundreds of times brighter than what is beside it; by its radiance its edge would be as jagged as without a
+//! filter, and have a black rim where the filter is negative.
 
 use std::ops::Range;
 
 use glam::{DVec2, Vec3};
 use rayon::prelude::*;
-use scene::Rgb;
+use scene::{Exposure, Rgb, tone_curve};
 
 use crate::filter::{Filter, SummedFilter};
 
@@ -16,8 +20,15 @@ use crate::filter::{Filter, SummedFilter};
 pub struct Tile {
     /// Upper left and lower right corner, pixels.
     pub bounds: [DVec2; 2],
-    /// W·sr⁻¹·m⁻²; of a change, what it is more than before.
-    pub radiance: Rgb,
+    /// W·sr⁻¹·m⁻².
+    pub radiance: Vec3,
+    /// What it had before, if it is a part of a tile that was added already: none where nothing was.
+    pub before: Vec3,
+}
+
+/// The light that a display shows of radiance, before its transfer function: each channel in 0..=1.
+pub fn shown(radiance: Vec3, exposure: Exposure) -> Vec3 {
+    (radiance * exposure.factor()).map(tone_curve)
 }
 
 /// Rows of a band, which one thread adds to at a time. Fewer are shared more evenly, and tiles lie in more of them.
@@ -34,6 +45,8 @@ pub struct Film {
     width: usize,
     height: usize,
     filter: SummedFilter,
+    /// How bright the picture is made, if it is one of what a display shows.
+    exposure: Option<Exposure>,
     /// Tiles of whole pixels, row by row.
     pixels: Vec<Sum>,
     /// Filtered tiles.
@@ -45,8 +58,8 @@ pub struct Film {
 }
 
 impl Film {
-    /// A black picture of so many pixels.
-    pub fn new(width: u32, height: u32, filter: Filter) -> Self {
+    /// A black picture of so many pixels: of what a display shows with an exposure, or of radiance.
+    pub fn new(width: u32, height: u32, filter: Filter, exposure: Option<Exposure>) -> Self {
         let filter = SummedFilter::new(filter);
         let inside = [width, height].map(|pixels| {
             let share = |i: u32| {
@@ -60,12 +73,12 @@ impl Film {
         let pixel = (-reach..=reach).map(weight).collect();
         let (width, height) = (width as usize, height as usize);
         let black = vec![[0.0; 4]; width * height];
-        Self { width, height, filter, pixels: black.clone(), filtered: black, pixel, inside }
+        Self { width, height, filter, exposure, pixels: black.clone(), filtered: black, pixel, inside }
     }
 
     /// Adds tiles, on all of rayon's threads. A pixel sums them in their order, whatever the number of threads.
     pub fn add(&mut self, tiles: &[Tile]) {
-        let (filter, size) = (&self.filter, [self.width, self.height]);
+        let (filter, size, exposure) = (&self.filter, [self.width, self.height], self.exposure);
         let mut of_band: Vec<Vec<u32>> = vec![Vec::new(); self.height.div_ceil(BAND)];
         for (number, tile) in (0..).zip(tiles) {
             let reached = reached(filter.radius, self.height, tile.bounds[0].y, tile.bounds[1].y);
@@ -84,13 +97,14 @@ impl Film {
                 let filter = (!is_whole).then_some(filter);
                 across.set(filter, size[0], low.x, high.x);
                 down.set(filter, size[1], low.y, high.y);
-                band.add(tile.radiance, is_whole, size[0], [&across, &down]);
+                let light = |radiance| exposure.map_or(radiance, |exposure| shown(radiance, exposure)).as_dvec3();
+                band.add(light(tile.radiance) - light(tile.before), is_whole, size[0], [&across, &down]);
             }
         });
     }
 
-    /// The picture of what was added so far, W·sr⁻¹·m⁻², row by row. Tiles are to fill the picture; where the filter ends
-    /// beyond it, what lies within counts for the whole.
+    /// The picture of what was added so far, row by row: radiance, W·sr⁻¹·m⁻², or what a display shows, above 0. Tiles are to fill the picture; where the filter ends
+    /// beyond it, what lies within counts for the whole. Where a filter overshoots to less than nothing, there is nothing.
     pub fn picture(&self) -> Vec<Vec3> {
         let (width, reach) = (self.width, self.pixel.len() / 2);
         // Across, then down: a pixel's weight is the product of both.
@@ -111,7 +125,7 @@ impl Film {
                 }
             }
             let pixel = |(&[red, green, blue, _], inside): (&Sum, &f64)| {
-                (Rgb::new(red, green, blue) / (inside * inside_rows[row])).as_vec3()
+                (Rgb::new(red, green, blue) / (inside * inside_rows[row])).max(Rgb::ZERO).as_vec3()
             };
             sums.iter().zip(inside_columns).map(pixel).collect::<Vec<Vec3>>()
         };
@@ -127,12 +141,12 @@ struct Band<'a> {
 }
 
 impl Band<'_> {
-    /// Adds radiance to the rows of a band, `width` pixels each, with the product of two weights.
-    fn add(&mut self, radiance: Rgb, is_whole: bool, width: usize, [across, down]: [&Weights; 2]) {
+    /// Adds light to the rows of a band, `width` pixels each, with the product of two weights.
+    fn add(&mut self, light: Rgb, is_whole: bool, width: usize, [across, down]: [&Weights; 2]) {
         let sums = if is_whole { &mut *self.pixels } else { &mut *self.filtered };
         let rows = self.first_row..self.first_row + sums.len() / width;
         for row in down.first.max(rows.start)..(down.first + down.weights.len()).min(rows.end) {
-            let Rgb { x, y, z } = radiance * down.weights[row - down.first];
+            let Rgb { x, y, z } = light * down.weights[row - down.first];
             let start = width * (row - rows.start) + across.first;
             let sums = &mut sums[start..start + across.weights.len()];
             sums.iter_mut().zip(&across.weights).for_each(|(sum, weight)| add(sum, &[x, y, z, 0.0], *weight));
@@ -198,7 +212,8 @@ mod tests {
     const ALL: [Filter; 5] = [Filter::Lanczos, Filter::Box, Filter::Triangle, Filter::Gaussian, Filter::Mitchell];
 
     fn tile(low: (f64, f64), high: (f64, f64), radiance: f64) -> Tile {
-        Tile { bounds: [low.into(), high.into()], radiance: Rgb::new(radiance, 2.0 * radiance, 0.0) }
+        let radiance = Vec3::new(radiance as f32, 2.0 * radiance as f32, 0.0);
+        Tile { bounds: [low.into(), high.into()], radiance, before: Vec3::ZERO }
     }
 
     /// Tiles of a grid over 20 × 13 pixels.
@@ -215,18 +230,18 @@ mod tests {
     #[test]
     fn no_pixels_and_no_tiles_give_no_light() {
         for (width, height) in [(0, 0), (0, 5), (5, 0)] {
-            let mut film = Film::new(width, height, Filter::Lanczos);
+            let mut film = Film::new(width, height, Filter::Lanczos, None);
             film.add(&[tile((0.0, 0.0), (5.0, 5.0), 1.0)]);
             assert!(film.picture().is_empty());
         }
-        assert_eq!(Film::new(2, 1, Filter::Box).picture(), [Vec3::ZERO; 2]);
+        assert_eq!(Film::new(2, 1, Filter::Box, None).picture(), [Vec3::ZERO; 2]);
     }
 
     #[test]
     fn even_light_stays_even_up_to_the_border() {
         for filter in ALL {
             for (columns, rows) in [(1, 1), (20, 13), (7, 40)] {
-                let mut film = Film::new(20, 13, filter);
+                let mut film = Film::new(20, 13, filter, None);
                 film.add(&grid(columns, rows, |_, _| 3.0));
                 for pixel in film.picture() {
                     assert!((pixel - Vec3::new(3.0, 6.0, 0.0)).length() < 1e-5, "{filter:?}: {pixel}");
@@ -237,7 +252,7 @@ mod tests {
 
     #[test]
     fn the_box_is_the_mean_of_the_pixel() {
-        let mut film = Film::new(2, 1, Filter::Box);
+        let mut film = Film::new(2, 1, Filter::Box, None);
         film.add(&[
             tile((0.0, 0.0), (0.75, 1.0), 1.0),
             tile((0.75, 0.0), (2.0, 0.5), 5.0),
@@ -252,10 +267,10 @@ mod tests {
     fn what_is_added_by_parts_is_the_same() {
         let wave = |x: f64, y: f64| 1.0 + (x * 0.7).sin() * (y * 0.9).cos();
         for filter in ALL {
-            let (mut whole, mut by_parts) = (Film::new(20, 13, filter), Film::new(20, 13, filter));
+            let (mut whole, mut by_parts) = (Film::new(20, 13, filter, None), Film::new(20, 13, filter, None));
             whole.add(&grid(40, 26, wave));
             by_parts.add(&grid(1, 1, |_, _| 1000.0));
-            let change = |tile: &Tile| Tile { radiance: tile.radiance - Rgb::new(1000.0, 2000.0, 0.0), ..*tile };
+            let change = |tile: &Tile| Tile { before: Vec3::new(1000.0, 2000.0, 0.0), ..*tile };
             let changes: Vec<Tile> = grid(40, 26, wave).iter().map(change).collect();
             changes.chunks(7).for_each(|some| by_parts.add(some));
             for (a, b) in whole.picture().into_iter().zip(by_parts.picture()) {
@@ -264,11 +279,26 @@ mod tests {
         }
     }
 
+    /// A lamp's edge in the middle of a pixel is half as bright as white, and has no black rim.
+    #[test]
+    fn what_a_display_shows_is_filtered_as_it_shows_it() {
+        let exposure = Exposure { ev: 1.0 };
+        let lamp = |filter: Filter, exposure: Option<Exposure>| {
+            let mut film = Film::new(20, 13, filter, exposure);
+            film.add(&[tile((0.0, 0.0), (10.5, 13.0), 0.1), tile((10.5, 0.0), (20.0, 13.0), 1e4)]);
+            film.picture()[6 * 20 + 8..6 * 20 + 14].iter().map(|pixel| pixel.x).collect::<Vec<f32>>()
+        };
+        let on_display = lamp(Filter::Box, Some(exposure));
+        assert!((on_display[1] - 0.2).abs() < 1e-6 && (on_display[2] - 0.6).abs() < 1e-6 && on_display[3] > 0.999);
+        assert!(lamp(Filter::Lanczos, Some(exposure)).iter().all(|&light| light > 0.1));
+        assert!(lamp(Filter::Lanczos, None).contains(&0.0), "by radiance it has the rim");
+    }
+
     /// All filters keep a slope; the further they reach, the less of the picture is free of the border.
     #[test]
     fn a_slope_is_kept_away_from_the_border() {
         for filter in ALL {
-            let mut film = Film::new(20, 13, filter);
+            let mut film = Film::new(20, 13, filter, None);
             film.add(&grid(400, 13, |x, _| x));
             let picture = film.picture();
             for x in 4..16 {

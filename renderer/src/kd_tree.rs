@@ -3,11 +3,15 @@
 //! Every leaf is a cell of the image plane with one sample in it; every node above has the mean over its cell. What the paper stores
 //! beside the mean is found where it is asked for, by walks down the tree ([`Visit`]) that take the cells beside them along: from
 //! these comes the external variance, and below the pixel level the variance of a mean and the number of samples. So a node
-//! needs 24 bytes and a sample 20.
+//! needs 24 bytes and a sample 32.
+//!
+//! Means are of what a display shows ([`shown`]), as the paper's are: a lamp's edge is no harder to know for being brighter than white.
 
 use glam::{Vec3, Vec3A};
+use scene::Exposure;
 
 use crate::cell::{Cell, Halves, PIXEL};
+use crate::film::shown;
 
 /// A child of a node: another node, or a leaf, whose number is that of its sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -70,6 +74,8 @@ pub(crate) struct Sample {
     pub place: [u32; 2],
     /// W·sr⁻¹·m⁻².
     pub radiance: Vec3,
+    /// What a display shows of it, 0..=1.
+    shown: Vec3,
 }
 
 /// A cell in a walk down the tree.
@@ -92,20 +98,16 @@ impl Visit {
 pub(crate) struct KdTree {
     /// Columns and rows of the picture.
     size: [u32; 2],
-    /// What radiance is multiplied by before it is compared.
-    exposure: f32,
+    exposure: Exposure,
     nodes: Vec<Node>,
     samples: Vec<Sample>,
     root: Link,
 }
 
-/// Exposed radiance above which nothing is told apart: the tone curve is within 1e-4 of its end there. Without a limit the edges of
-/// a lamp would take most of all samples.
-pub(crate) const WHITE: f32 = 4.0;
-
 impl KdTree {
-    /// One cell with one sample.
-    pub fn new(size: [u32; 2], exposure: f32, first: Sample) -> Self {
+    /// One cell with one sample, at a place in it.
+    pub fn new(size: [u32; 2], exposure: Exposure, place: [u32; 2], radiance: Vec3) -> Self {
+        let first = Sample { place, radiance, shown: shown(radiance, exposure) };
         Self { size, exposure, nodes: Vec::new(), samples: vec![first], root: Link(LEAF) }
     }
 
@@ -124,14 +126,10 @@ impl KdTree {
         &self.samples[leaf.index()]
     }
 
-    /// The mean of a cell, exposed.
+    /// The mean over a cell of what a display shows.
     #[inline]
     pub fn mean(&self, link: Link) -> Vec3A {
-        if link.is_leaf() {
-            (Vec3A::from(self.samples[link.index()].radiance) * self.exposure).min(Vec3A::splat(WHITE))
-        } else {
-            self.nodes[link.index()].mean.into()
-        }
+        if link.is_leaf() { self.samples[link.index()].shown.into() } else { self.nodes[link.index()].mean.into() }
     }
 
     /// Where all walks begin.
@@ -228,11 +226,11 @@ impl KdTree {
     }
 
     /// Parts the cell of a leaf: its sample stays in one half, the new one is that of the other, the `side`. The node above both.
-    pub fn part(&mut self, slot: Slot, side: usize, new: Sample) -> u32 {
+    pub fn part(&mut self, slot: Slot, side: usize, place: [u32; 2], radiance: Vec3) -> u32 {
         let mut links = [self.link_at(slot); 2];
         links[side] = Link(self.samples.len() as u32 | LEAF);
         let node = self.nodes.len() as u32;
-        self.samples.push(new);
+        self.samples.push(Sample { place, radiance, shown: shown(radiance, self.exposure) });
         self.nodes.push(Node { links, slot, mean: Vec3::ZERO });
         self.set_link(slot, Link(node));
         node
