@@ -15,7 +15,7 @@ use crate::failure::Usage;
 
 mod render;
 
-pub use render::{Budget, RadianceChoice, RadianceFlags, RenderFlags, SamplerChoice};
+pub use render::{Budget, Interpolation, RadianceChoice, RadianceFlags, RenderFlags, SamplerChoice};
 
 /// Largest side of a picture, pixels: what every GPU of the last ten years takes as a texture.
 const LARGEST_SIDE: u32 = 16_384;

@@ -8,12 +8,13 @@ use formats::FormatError;
 use glam::{DVec2, Vec3};
 use rayon::prelude::*;
 use renderer::{
-    AdaptiveOptions, AdaptiveSampler, Evaluation, Evaluator, Film, Tile, UniformSampler, sample_histogram, sample_map,
+    AdaptiveOptions, AdaptiveSampler, Evaluation, Evaluator, Film, ScatteredFilm, Surface, Tile, UniformSampler,
+    sample_histogram, sample_map,
 };
 use scene::{Exposure, encode_srgb, luminance};
 use serde::Serialize;
 
-use crate::args::{Budget, ExposureChoice, ImageKind, RenderFlags, SamplerChoice};
+use crate::args::{Budget, ExposureChoice, ImageKind, Interpolation, RenderFlags, SamplerChoice};
 use crate::failure::{Outcome, Usage};
 use crate::input::Input;
 use crate::interrupt::Interrupt;
@@ -138,12 +139,48 @@ impl Sampler {
     }
 }
 
+/// What makes a picture of samples.
+enum Reconstruction {
+    Cells(Film),
+    Triangles(ScatteredFilm, Surface),
+}
+
+impl Reconstruction {
+    fn new(flags: &RenderFlags, exposure: Option<Exposure>) -> Self {
+        let ((width, height), filter) = (flags.size, flags.filter.into());
+        let surface = match flags.interpolation {
+            Interpolation::Constant => return Self::Cells(Film::new(width, height, filter, exposure)),
+            Interpolation::Planar => Surface::Planar,
+            Interpolation::Smooth => Surface::Smooth,
+        };
+        Self::Triangles(ScatteredFilm::new(width, height, filter, exposure), surface)
+    }
+
+    /// Adds what was seen at points, and the cells that changed by it.
+    fn add(&mut self, points: &[DVec2], seen: &[Evaluation], tiles: &[Tile]) {
+        match self {
+            Self::Cells(film) => film.add(tiles),
+            Self::Triangles(film, _) => {
+                let finite = points.iter().zip(seen).filter(|(_, seen)| seen.radiance.is_finite());
+                finite.for_each(|(&point, seen)| film.add(point, seen.radiance));
+            }
+        }
+    }
+
+    fn picture(&self) -> Vec<Vec3> {
+        match self {
+            Self::Cells(film) => film.picture(),
+            Self::Triangles(film, surface) => film.picture(*surface),
+        }
+    }
+}
+
 /// A picture in the making.
 struct Picture {
     size: (u32, u32),
     exposure: Exposure,
     sampler: Sampler,
-    film: Film,
+    film: Reconstruction,
     /// Of snapshots, as of the picture.
     extension: &'static str,
     /// Rays of all samples, those from the eye included.
@@ -155,7 +192,7 @@ impl Picture {
     fn new(flags: &RenderFlags, exposure: Exposure, limit: &Limit, evaluate: &Evaluator<'_>) -> Result<Self> {
         let (width, height) = flags.size;
         let is_exr = ImageKind::of(&flags.output) == Some(ImageKind::Exr);
-        let mut film = Film::new(width, height, flags.filter.into(), (!is_exr).then_some(exposure));
+        let mut film = Reconstruction::new(flags, (!is_exr).then_some(exposure));
         let sampler = match flags.sampler {
             SamplerChoice::Adaptive => {
                 let options = AdaptiveOptions {
@@ -178,8 +215,13 @@ impl Picture {
                 "--size {width}x{height} with --budget: that many samples cannot be counted; ask for fewer"
             )))
         };
+        // The adaptive sampler begins with one.
         if let Sampler::Adaptive(sampler) = &sampler {
-            film.add(&sampler.tiles());
+            let (points, seen): (Vec<DVec2>, Vec<Evaluation>) = sampler
+                .points()
+                .map(|(point, radiance)| (point, Evaluation { radiance, ..Evaluation::default() }))
+                .unzip();
+            film.add(&points, &seen, &sampler.tiles());
         }
         let seconds = Seconds { generate: 0.0, evaluate: 0.0, reconstruct: 0.0 };
         let extension = if is_exr { "exr" } else { "png" };
@@ -208,7 +250,7 @@ impl Picture {
             let seen = timed(&mut self.seconds.evaluate, || seen_at(&batch, evaluate, &late));
             self.rays += seen.iter().map(|evaluation| u64::from(evaluation.cost)).sum::<u64>();
             let tiles = timed(&mut self.seconds.generate, || self.sampler.take(&seen));
-            timed(&mut self.seconds.reconstruct, || self.film.add(&tiles));
+            timed(&mut self.seconds.reconstruct, || self.film.add(&batch, &seen, &tiles));
             let samples = self.sampler.samples();
             let of_limit = samples as f64 / limit.samples as f64;
             let of_time = start.elapsed().as_secs_f64() / limit.seconds;
@@ -368,7 +410,7 @@ mod tests {
 
     #[test]
     fn background_and_what_is_no_number_do_not_meter() {
-        let seen = |point: DVec2| match point.x as u32 % 3 {
+        let seen = |point: DVec2| match (point.x / 3.0) as u32 % 3 {
             0 => Evaluation::default(),
             1 => Evaluation { radiance: Vec3::NAN, object: 1, cost: 1 },
             _ => Evaluation { radiance: Vec3::splat(3.0), object: 1, cost: 1 },

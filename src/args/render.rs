@@ -45,6 +45,9 @@ pub struct RenderFlags {
     /// The filter that the picture is seen through
     #[arg(long, value_enum, default_value_t)]
     pub filter: FilterChoice,
+    /// The surface through the samples that is filtered
+    #[arg(long, value_enum, default_value_t)]
+    pub interpolation: Interpolation,
     /// Folder for a picture at every doubling of the samples, named by their number
     #[arg(long, value_name = "DIR")]
     pub snapshots: Option<PathBuf>,
@@ -179,6 +182,18 @@ impl From<FilterChoice> for Filter {
             FilterChoice::Mitchell => Self::Mitchell,
         }
     }
+}
+
+/// The surface through the samples.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum Interpolation {
+    /// Each sample's cell has its light; the fastest.
+    #[default]
+    Constant,
+    /// Planes over the Delaunay triangles of the samples.
+    Planar,
+    /// Quadratics over them that meet without folds.
+    Smooth,
 }
 
 /// How much is done at most.
