@@ -72,27 +72,3 @@ fn depth(outline: &[DVec3], point: &SurfacePoint) -> f64 {
         |(&from, &to): (&DVec3, &DVec3)| point.normal.cross((to - from).normalize_or_zero()).dot(point.position - from);
     edges.map(inside).fold(f64::INFINITY, f64::min)
 }
-
-#[cfg(test)]
-mod tests {
-    #![allow(clippy::unwrap_used)]
-    use std::path::Path;
-
-    use super::*;
-
-    /// Points of all surfaces, one after another on the same leaves and in turn on others.
-    #[test]
-    fn it_says_what_a_gather_that_keeps_nothing_says() {
-        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("data/scenes/cornell_box.obj");
-        let scene = formats::read_scene(&path).unwrap().scene;
-        let solution = solver::solve(&scene, &solver::SolveOptions { link_error: None, bounces: Some(0) }, &|_| {});
-        let gather = Gather::new(&scene, &solution);
-        let points = renderer::spread_by_area(&scene, 200, 1e-3, 1, |_| true);
-        let kept = PointGather::new(&scene, &solution, &gather);
-        for point in points.iter().chain(points.iter().rev()) {
-            let inward = centroid(&scene.outline(point.polygon)) - point.position;
-            let anew = gather.irradiance_at(point.polygon, point.position, inward);
-            assert!((kept.irradiance(point) - anew).length() <= 1e-9 * (1.0 + anew.length()));
-        }
-    }
-}

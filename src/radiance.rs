@@ -117,3 +117,29 @@ fn check_bounces(flags: &RenderFlags, provenance: &Provenance) -> Result<()> {
     }
     Ok(())
 }
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use std::path::Path;
+
+    use scene::centroid;
+
+    use super::*;
+
+    /// Points of all surfaces, one after another on the same leaves and in turn on others.
+    #[test]
+    fn a_gather_that_keeps_its_leaves_says_what_one_that_does_not_says() {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("data/scenes/cornell_box.obj");
+        let scene = formats::read_scene(&path).unwrap().scene;
+        let solution = solver::solve(&scene, &solver::SolveOptions { link_error: None, bounces: Some(0) }, &|_| {});
+        let gather = Gather::new(&scene, &solution);
+        let points = renderer::spread_by_area(&scene, 200, 1e-3, 1, |_| true);
+        let kept = PointGather::new(&scene, &solution, &gather);
+        for point in points.iter().chain(points.iter().rev()) {
+            let inward = centroid(&scene.outline(point.polygon)) - point.position;
+            let anew = gather.irradiance_at(point.polygon, point.position, inward);
+            assert!((kept.irradiance(point) - anew).length() <= 1e-9 * (1.0 + anew.length()));
+        }
+    }
+}

@@ -50,6 +50,22 @@ pub fn seconds_of_programs() -> Option<f64> {
     None
 }
 
+/// User and system seconds of this program so far; those of a clock where the system does not tell.
+pub fn seconds_of_this_program() -> f64 {
+    #[cfg(unix)]
+    {
+        use nix::sys::resource::{UsageWho, getrusage};
+        use nix::sys::time::TimeValLike;
+        let usage = getrusage(UsageWho::RUSAGE_SELF).unwrap();
+        (usage.user_time() + usage.system_time()).num_microseconds() as f64 * 1e-6
+    }
+    #[cfg(not(unix))]
+    {
+        static START: std::sync::OnceLock<std::time::Instant> = std::sync::OnceLock::new();
+        START.get_or_init(std::time::Instant::now).elapsed().as_secs_f64()
+    }
+}
+
 /// The line of a record that names the machine.
 pub fn machine() -> String {
     format!("Machine: {}, {} threads.", processor(), std::thread::available_parallelism().unwrap())

@@ -16,26 +16,22 @@
 //! - Beside the paper's rule for the variance of a mean there is one that keeps what it says ([`Rule`]).
 
 use glam::{DVec2, Vec3};
-use rayon::prelude::*;
 use scene::Exposure;
 
 use crate::cell::{Cell, Halves, MOST_PIXELS, pixels};
 use crate::confidence::{Confidence, Interval};
 use crate::evaluation::{Evaluation, Evaluator};
 use crate::film::Tile;
-use crate::kd_tree::{KdTree, MOST_SAMPLES, Slot, Visit};
+use crate::kd_tree::{KdTree, MOST_SAMPLES, Sample, Slot, Visit};
 use crate::sequence::scatter;
-use crate::survey::{Part, Rule, Survey, external_variance};
+use crate::survey::{Part, Rule, Survey};
 
 /// Samples of the first batches: enough for all threads, and a sketch of the picture.
 const FIRST_BATCH: usize = 1024;
 
 /// Part of all samples so far that a batch adds: more is decided at once on what was known before, less walks over the whole tree
 /// for few.
-const GROWTH: usize = 4;
-
-/// The same of a pixel's samples.
-const PIXEL_GROWTH: usize = 4;
+const GROWTH: usize = 2;
 
 /// External variance that the most even cell is taken to have: of even ones the largest is parted first.
 const EVEN: f32 = 1e-12;
@@ -80,6 +76,8 @@ struct Parting {
     side: usize,
     half: Cell,
     place: [u32; 2],
+    /// Radiance of the whole so far.
+    before: Vec3,
 }
 
 /// What a walk finds.
@@ -138,14 +136,15 @@ impl AdaptiveSampler {
     pub fn take(&mut self, seen: &[Evaluation]) -> Vec<Tile> {
         let (mut nodes, mut changes) = (Vec::with_capacity(seen.len()), Vec::with_capacity(seen.len()));
         for (parting, evaluation) in self.batch.drain(..).zip(seen) {
-            let before = self.tree.sample(self.tree.link_at(parting.slot)).radiance;
+            let before = parting.before;
             let is_number = evaluation.radiance.is_finite();
             self.excluded += u64::from(!is_number);
             let radiance = if is_number { evaluation.radiance } else { before };
-            nodes.push(self.tree.part(parting.slot, parting.side, parting.place, radiance));
+            let node = self.tree.part(parting.slot, parting.side, parting.place, radiance);
+            nodes.push((parting.half.level() + 1, node));
             changes.push(Tile { bounds: parting.half.bounds(self.size), radiance, before });
         }
-        self.tree.update(nodes);
+        self.tree.update(&nodes);
         changes
     }
 
@@ -217,13 +216,11 @@ impl AdaptiveSampler {
         if visit.cell.is_pixel() {
             return self.look_at_pixel(visit, survey, found);
         }
-        let halves = tree.halves(visit);
-        if visit.link().is_leaf() && halves[1].is_some() {
-            let external = external_variance(&tree.differences(visit));
-            found.open.push((visit.cell.area(self.size) * (external + EVEN), visit.slot, visit.cell));
-            return;
+        if visit.link().is_leaf() && matches!(visit.cell.halves(self.size), Halves::Both(..)) {
+            let priority = visit.cell.area(self.size) * (tree.spread(visit).external() + EVEN);
+            return found.open.push((priority, visit.slot, visit.cell));
         }
-        for half in halves.iter().flatten().filter(|half| !half.link().is_closed()) {
+        for half in tree.halves(visit).iter().flatten().filter(|half| !half.link().is_closed()) {
             self.sweep(half, survey, found);
         }
     }
@@ -233,20 +230,25 @@ impl AdaptiveSampler {
         if !self.tree.is_surrounded(pixel) {
             return;
         }
-        let external = external_variance(&self.tree.differences(pixel));
-        survey.look(&self.tree, pixel, external);
-        if self.confidence.holds(self.tree.mean(pixel.link()), survey.variance, survey.degrees) {
+        survey.look(&self.tree, pixel);
+        let excess = self.confidence.excess(self.tree.mean(pixel.link()), survey.variance, survey.degrees);
+        if excess <= 1.0 {
             return found.known.push(pixel.slot);
         }
         let parts = &mut survey.parts;
         let count = parts.len();
-        let priority = if count == 1 { external } else { survey.variance };
-        let wanted = 1 + count / PIXEL_GROWTH;
+        let priority = if count == 1 { survey.external } else { survey.variance };
+        let wanted = ((count as f32 * (excess.cbrt() - 1.0)).ceil() as usize).clamp(1, count);
         if wanted < count {
             let tie = |part: &Part| scatter(self.seed, part.cell.number());
             let order = |a: &Part, b: &Part| b.weight.total_cmp(&a.weight).then_with(|| tie(a).cmp(&tie(b)));
             parts.select_nth_unstable_by(wanted, order);
             parts.truncate(wanted);
+        }
+        // Of an even share of the variance, those that have less than half are not worth a sample yet.
+        let least = 0.5 * survey.total / count as f32;
+        if parts.iter().any(|part| part.weight >= least) {
+            parts.retain(|part| part.weight >= least);
         }
         found.open.extend(parts.iter().map(|part| (priority + EVEN, part.slot, part.cell)));
     }
@@ -254,9 +256,10 @@ impl AdaptiveSampler {
     /// How a leaf is parted; not at all if it is one unit.
     fn parting(&self, slot: Slot, cell: &Cell) -> Option<Parting> {
         let Halves::Both(_, halves) = cell.halves(self.size) else { return None };
-        let side = usize::from(halves[0].contains(self.tree.sample(self.tree.link_at(slot)).place));
+        let Sample { place, radiance } = *self.tree.sample(self.tree.link_at(slot));
+        let side = usize::from(halves[0].contains(place));
         let half = halves[side];
-        Some(Parting { slot, side, half, place: jittered(&half, self.size, self.seed) })
+        Some(Parting { slot, side, half, place: jittered(&half, self.size, self.seed), before: radiance })
     }
 }
 
@@ -271,12 +274,14 @@ fn keep_largest(open: &mut Vec<(f32, Slot, Cell)>, most: usize, seed: u64) {
     if open.len() <= most {
         return;
     }
+    let order = |a: &(f32, u32), b: &(f32, u32)| {
+        let tie = |place: u32| scatter(seed, place.into());
+        b.0.total_cmp(&a.0).then_with(|| tie(a.1).cmp(&tie(b.1)))
+    };
     let mut ranked: Vec<(f32, u32)> = open.iter().map(|cell| cell.0).zip(0..).collect();
-    let tie = |place: u32| scatter(seed, place.into());
-    ranked.select_nth_unstable_by(most, |a, b| b.0.total_cmp(&a.0).then_with(|| tie(a.1).cmp(&tie(b.1))));
-    let mut kept: Vec<u32> = ranked[..most].iter().map(|&(_, place)| place).collect();
-    kept.par_sort_unstable();
-    *open = kept.iter().map(|&place| open[place as usize]).collect();
+    let (_, &mut first_left_out, _) = ranked.select_nth_unstable_by(most, order);
+    let mut place = 0..;
+    open.retain(|cell| place.next().is_some_and(|place| order(&(cell.0, place), &first_left_out).is_lt()));
 }
 
 #[cfg(test)]
@@ -316,7 +321,7 @@ mod tests {
     fn truth(pixel: usize, width: u32) -> Vec3 {
         let corner = DVec2::new((pixel % width as usize) as f64, (pixel / width as usize) as f64);
         let place = |i: u32| corner + (DVec2::new(f64::from(i % 64), f64::from(i / 64)) + 0.5) / 64.0;
-        (0..4096).map(|i| shown(disk(place(i)).radiance, OPTIONS.exposure)).sum::<Vec3>() / 4096.0
+        (0..4096).map(|i| shown(disk(place(i)).radiance, OPTIONS.exposure.factor())).sum::<Vec3>() / 4096.0
     }
 
     #[test]

@@ -49,6 +49,11 @@ impl Cell {
         self.log_sides == [PIXEL; 2]
     }
 
+    /// How often a cell may be halved: the same for all of one size.
+    pub fn level(&self) -> u8 {
+        self.log_sides[0] + self.log_sides[1]
+    }
+
     /// A number that no other cell has: its middle. One unit wide, it may be another's corner.
     pub fn number(&self) -> u64 {
         let middle = |axis: usize| u64::from(self.corner[axis]) + (1 << self.log_sides[axis] >> 1);

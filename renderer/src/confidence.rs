@@ -39,8 +39,9 @@ impl Confidence {
         Self { quantiles, widths }
     }
 
-    /// Whether a mean with a variance, that of the channel where it is largest, is known well enough.
-    pub fn holds(&self, mean: Vec3A, variance: f32, degrees: f32) -> bool {
+    /// How many times too large a variance of a mean is, that of the channel where it is largest: up to 1 the mean is known well
+    /// enough.
+    pub fn excess(&self, mean: Vec3A, variance: f32, degrees: f32) -> f32 {
         let quantile = self.quantiles[(degrees as usize).min(MOST_DEGREES)];
         let step = |channel: f32| (channel.max(0.0).sqrt() * STEPS as f32) as usize;
         let width = |channel: f32| {
@@ -48,8 +49,9 @@ impl Confidence {
             self.widths[step].min(self.widths[step + 1])
         };
         let narrowest = mean.to_array().map(width).into_iter().fold(f32::INFINITY, f32::min);
-        // Of 0 degrees the quantile is infinite, and the product with no variance no number: nothing holds.
-        quantile * variance.sqrt() <= narrowest
+        let root = quantile / narrowest;
+        // Of 0 degrees the quantile is infinite, whatever the variance.
+        if root.is_finite() { variance * root * root } else { f32::INFINITY }
     }
 }
 
@@ -124,12 +126,13 @@ mod tests {
     #[test]
     fn nothing_is_known_from_one_sample_and_all_where_nothing_varies() {
         let confidence = Confidence::new(0.99, Interval::Linear(0.01));
-        assert!(!confidence.holds(Vec3A::ONE, 0.0, 0.0));
-        assert!(!confidence.holds(Vec3A::ONE, f32::NAN, 9.0));
-        assert!(confidence.holds(Vec3A::ONE, 0.0, 1.0));
+        assert_eq!(confidence.excess(Vec3A::ONE, 0.0, 0.0), f32::INFINITY);
+        assert_eq!(confidence.excess(Vec3A::ONE, 0.0, 1.0), 0.0);
         let half = |t: f32| (0.01 / t).powi(2);
-        assert!(confidence.holds(Vec3A::ONE, half(3.36), 8.0) && !confidence.holds(Vec3A::ONE, half(3.35), 8.0));
-        assert!(confidence.holds(Vec3A::ONE, half(2.63), 1e9) && !confidence.holds(Vec3A::ONE, half(2.62), 1e9));
+        for (t, degrees) in [(3.3554, 8.0), (2.6259, 1e9)] {
+            assert!((confidence.excess(Vec3A::ONE, half(t), degrees) - 1.0).abs() < 1e-3);
+            assert!((confidence.excess(Vec3A::ONE, 4.0 * half(t), degrees) - 4.0).abs() < 4e-3);
+        }
     }
 
     /// A step of what an eye sees is a small step of light in the dark, and a large one in highlights.
@@ -146,7 +149,7 @@ mod tests {
         assert!(widths.is_sorted(), "{widths:?}");
         let confidence = Confidence::new(0.99, interval);
         let variance = (0.003_f32 / 3.4).powi(2);
-        assert!(confidence.holds(Vec3A::splat(0.5), variance, 8.0));
-        assert!(!confidence.holds(Vec3A::new(0.5, 0.01, 0.5), variance, 8.0), "the dark channel counts, too");
+        assert!(confidence.excess(Vec3A::splat(0.5), variance, 8.0) < 1.0);
+        assert!(confidence.excess(Vec3A::new(0.5, 0.01, 0.5), variance, 8.0) > 1.0, "the dark channel counts, too");
     }
 }

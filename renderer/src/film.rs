@@ -26,9 +26,10 @@ pub struct Tile {
     pub before: Vec3,
 }
 
-/// The light that a display shows of radiance, before its transfer function: each channel in 0..=1.
-pub fn shown(radiance: Vec3, exposure: Exposure) -> Vec3 {
-    (radiance * exposure.factor()).map(tone_curve)
+/// The light that a display shows of radiance that is multiplied by a factor ([`Exposure::factor`]), before its transfer function:
+/// each channel in 0..=1.
+pub fn shown(radiance: Vec3, factor: f32) -> Vec3 {
+    (radiance * factor).map(tone_curve)
 }
 
 /// Rows of a band, which one thread adds to at a time. Fewer are shared more evenly, and tiles lie in more of them.
@@ -45,8 +46,8 @@ pub struct Film {
     width: usize,
     height: usize,
     filter: SummedFilter,
-    /// How bright the picture is made, if it is one of what a display shows.
-    exposure: Option<Exposure>,
+    /// What radiance is multiplied by, if the picture is one of what a display shows.
+    factor: Option<f32>,
     /// Tiles of whole pixels, row by row.
     pixels: Vec<Sum>,
     /// Filtered tiles.
@@ -73,12 +74,21 @@ impl Film {
         let pixel = (-reach..=reach).map(weight).collect();
         let (width, height) = (width as usize, height as usize);
         let black = vec![[0.0; 4]; width * height];
-        Self { width, height, filter, exposure, pixels: black.clone(), filtered: black, pixel, inside }
+        Self {
+            width,
+            height,
+            filter,
+            factor: exposure.map(Exposure::factor),
+            pixels: black.clone(),
+            filtered: black,
+            pixel,
+            inside,
+        }
     }
 
     /// Adds tiles, on all of rayon's threads. A pixel sums them in their order, whatever the number of threads.
     pub fn add(&mut self, tiles: &[Tile]) {
-        let (filter, size, exposure) = (&self.filter, [self.width, self.height], self.exposure);
+        let (filter, size, factor) = (&self.filter, [self.width, self.height], self.factor);
         let mut of_band: Vec<Vec<u32>> = vec![Vec::new(); self.height.div_ceil(BAND)];
         for (number, tile) in (0..).zip(tiles) {
             let reached = reached(filter.radius, self.height, tile.bounds[0].y, tile.bounds[1].y);
@@ -97,7 +107,7 @@ impl Film {
                 let filter = (!is_whole).then_some(filter);
                 across.set(filter, size[0], low.x, high.x);
                 down.set(filter, size[1], low.y, high.y);
-                let light = |radiance| exposure.map_or(radiance, |exposure| shown(radiance, exposure)).as_dvec3();
+                let light = |radiance| factor.map_or(radiance, |factor| shown(radiance, factor)).as_dvec3();
                 band.add(light(tile.radiance) - light(tile.before), is_whole, size[0], [&across, &down]);
             }
         });

@@ -26,19 +26,24 @@ pub enum Surface {
 pub struct ScatteredFilm {
     size: [u32; 2],
     filter: SummedFilter,
-    exposure: Option<Exposure>,
+    factor: Option<f32>,
     samples: Delaunay,
 }
 
 impl ScatteredFilm {
     /// A black picture of so many pixels: of what a display shows with an exposure, or of radiance.
     pub fn new(width: u32, height: u32, filter: Filter, exposure: Option<Exposure>) -> Self {
-        Self { size: [width, height], filter: SummedFilter::new(filter), exposure, samples: Delaunay::default() }
+        Self {
+            size: [width, height],
+            filter: SummedFilter::new(filter),
+            factor: exposure.map(Exposure::factor),
+            samples: Delaunay::default(),
+        }
     }
 
     /// Adds radiance at a point of the image plane, W·sr⁻¹·m⁻².
     pub fn add(&mut self, point: DVec2, radiance: Vec3) {
-        let light = self.exposure.map_or(radiance, |exposure| shown(radiance, exposure));
+        let light = self.factor.map_or(radiance, |factor| shown(radiance, factor));
         self.samples.insert(point, light);
     }
 
