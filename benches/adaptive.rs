@@ -33,8 +33,8 @@ const SIZES: [u32; 4] = [64, 128, 256, 512];
 /// The side of the pictures that uniform sampling is compared on, pixels.
 const COMPARED: u32 = 256;
 
-/// Points along a side of a pixel that its true mean is taken from: where all of a few agree to a quarter of the interval, and
-/// elsewhere. A straight border of full contrast is then off by a fifth of the interval, on the mean.
+/// Points along a side of a pixel that its true mean is taken from: where all of a few agree to two intervals, and elsewhere. What
+/// a straight border of contrast 0.3 leaves is then a fourth of the interval, and less in pixels without one.
 const POINTS: [u32; 2] = [8, 48];
 
 fn main() {
@@ -197,7 +197,7 @@ fn truth(view: &View, side: u32) -> Vec<Vec3> {
         };
         let pixel = |pixel: u32| {
             let (few, range) = mean(pixel, POINTS[0]);
-            if f64::from(range) < INTERVAL / 4.0 { few } else { mean(pixel, POINTS[1]).0 }
+            if f64::from(range) < 2.0 * INTERVAL { few } else { mean(pixel, POINTS[1]).0 }
         };
         (0..side * side).into_par_iter().map(pixel).collect()
     })
