@@ -4,18 +4,18 @@
 //! round asks for less. Rounds are global: what is divided depends on the light alone, never on threads.
 
 use glam::Vec3;
-use rayon::prelude::*;
-use scene::{Answers, Baked, BakedElement, BakedError, BakedTriangle, HalfEdges, Provenance, Rgb, Scene};
+use scene::{Answers, Baked, BakedElement, BakedError, BakedTriangle, Provenance, Rgb, Scene};
 use solver::{Solution, Visibility};
 
 use crate::claimed_error::{P99, mean_reflectance, measured};
 use crate::fine_mesh::{EmittedLight, FineMesh};
 use crate::inquiry::Inquiry;
+use crate::lines::Lines;
 use crate::probe::colour_mean;
 use crate::reflected_light::ReflectedLight;
 use crate::residual::residual;
 use crate::rounds::Rounds;
-use crate::{Discontinuity, Leaf, Mesh, MeshStatistics, Progress, Weight, discontinuities};
+use crate::{Leaf, Mesh, MeshStatistics, Progress, Weight};
 
 /// What a bake is asked for.
 #[derive(Clone, Debug, PartialEq)]
@@ -116,7 +116,7 @@ pub struct BakeStatistics {
     pub rounds: u32,
     /// The least weight that was used, in the weight's unit.
     pub min_weight: f64,
-    /// Discontinuities of at least the least weight, over all polygons.
+    /// Discontinuities of at least the least weight that were found, on all polygons or in all leaves that were looked at.
     pub discontinuities_found: usize,
     /// Discontinuities that at least one leaf follows.
     pub discontinuities_kept: usize,
@@ -153,7 +153,7 @@ pub fn resume(
     let relative = options.tolerance / BakeOptions::default().tolerance;
     let min_weight = options.min_weight.unwrap_or_else(|| relative * options.weight.default_minimum(scene, &solution));
     (control.progress)(0.0);
-    let found = all_discontinuities(scene, &solution, options.weight, min_weight);
+    let lines = Lines::of_links(scene, &solution, options.weight, min_weight);
     let reflectance = mean_reflectance(scene, &solution);
     let by_rays = solution.visibility == Visibility::Rays;
     // Without links elements are as small as they need to be at first.
@@ -166,7 +166,7 @@ pub fn resume(
         reflected: ReflectedLight::new(&solution, front),
         mean: colour_mean(solution.mean_irradiance),
         is_guessed: by_rays,
-        found,
+        lines,
         share: if by_rays { FIRST_SHARE_BY_RAYS } else { FIRST_SHARE },
         source_share: FIRST_SOURCE_SHARE,
         reflectance,
@@ -212,7 +212,7 @@ pub fn resume(
     let samples: Vec<Vec3> = samples.iter().map(|value| value.max(Rgb::ZERO).as_vec3()).collect();
     let (vertices, triangles) = stored_triangles(&fine.leaves, &fine.mesh, &fine.table.triangles);
     let statistics = BakeStatistics {
-        discontinuities_found: rounds.found.iter().map(Vec::len).sum(),
+        discontinuities_found: rounds.lines.all().len(),
         discontinuities_kept: fine.lines.len(),
         vertices: vertices.len(),
         triangles: triangles.len(),
@@ -241,19 +241,6 @@ pub fn resume(
         provenance: Provenance::default(),
     };
     Bake { baked, solution: rounds.solution, statistics, answers: rounds.inquiry.into_answers() }
-}
-
-/// The discontinuities on every polygon.
-fn all_discontinuities(scene: &Scene, solution: &Solution, weight: Weight, min_weight: f64) -> Vec<Vec<Discontinuity>> {
-    let half_edges = HalfEdges::new(scene);
-    scene
-        .polygon_ids()
-        .into_par_iter()
-        .map(|receiver| {
-            let interactions = solution.interactions(scene, receiver);
-            discontinuities(scene, &half_edges, receiver, &interactions, weight, min_weight)
-        })
-        .collect()
 }
 
 /// The mesh as it is stored: without the vertices that no triangle uses.

@@ -17,6 +17,7 @@ mod inquiry;
 mod interval;
 mod leaf_error;
 mod leaf_mesh;
+mod lines;
 mod memory;
 mod probe;
 mod projection;
