@@ -64,7 +64,7 @@ fn main() {
     for (width, height) in [(640, 480), (1920, 1080)] {
         for mode in [Mode::Shaded, Mode::Gouraud] {
             let camera = baked.scene.cameras[0].camera;
-            let frame = Frame { camera, width, height, mode, exposure: None };
+            let frame = Frame { camera, width, height, mode, exposure: None, curve: scene::ToneCurve::default() };
             let exposure = draw_on_cpu(&baked, &frame).exposure;
             let line = |name: &str, milliseconds: f64| {
                 let rate = 1000.0 / milliseconds;
@@ -74,7 +74,10 @@ fn main() {
             line("CPU, its hierarchy built anew", median_of(|| drop(draw_on_cpu(&baked, &frame))));
             if let Some(gpu) = &gpu {
                 let capture = Capture::new(gpu, &baked, width, height).unwrap();
-                line(&gpu.adapter_name(), median_of(|| drop(capture.draw(&camera, mode, exposure).unwrap())));
+                line(
+                    &gpu.adapter_name(),
+                    median_of(|| drop(capture.draw(&camera, mode, exposure, frame.curve).unwrap())),
+                );
             }
         }
     }

@@ -7,7 +7,7 @@ use bytesize::ByteSize;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use glam::DVec3;
-use scene::{Camera, Exposure};
+use scene::{Camera, Exposure, ToneCurve};
 use serde::Serialize;
 use viewer::Mode;
 
@@ -170,6 +170,9 @@ pub struct ShotFlags {
     /// Exposure value, by which radiance is multiplied as 2^EV, or auto
     #[arg(long, value_name = "EV|auto", default_value = "auto", value_parser = exposure, allow_hyphen_values = true)]
     pub exposure: ExposureChoice,
+    /// How exposed light is brought into what a display shows: straight with a shoulder, straight and clipped, or as film has it
+    #[arg(long, default_value = "shoulder", value_parser = tone_curve())]
+    pub tone_curve: ToneCurve,
     /// Picture to compare with: an EXR by the relative RMSE of radiance, a PNG by the share of pixels off by more
     /// than 1/255
     #[arg(long, value_name = "REFERENCE", value_parser = image_path, requires = "max_error")]
@@ -465,6 +468,11 @@ fn png_path(text: &str) -> Result<PathBuf, String> {
 
 fn mode() -> impl TypedValueParser<Value = Mode> {
     PossibleValuesParser::new(Mode::ALL.map(Mode::name)).try_map(|text| text.parse::<Mode>())
+}
+
+fn tone_curve() -> impl TypedValueParser<Value = ToneCurve> {
+    let named = |text: String| ToneCurve::ALL.into_iter().find(|curve| curve.name() == text).ok_or("no such curve");
+    PossibleValuesParser::new(ToneCurve::ALL.map(ToneCurve::name)).try_map(named)
 }
 
 /// A kind of picture file, by the end of its name.

@@ -11,6 +11,7 @@ mod ground_truth;
 mod info;
 mod input;
 mod interrupt;
+mod light_sources;
 mod memory;
 mod output;
 mod pipeline;
@@ -23,6 +24,7 @@ mod validate;
 mod verification;
 mod verify;
 mod view;
+mod watch;
 
 use std::process::ExitCode;
 

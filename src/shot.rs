@@ -36,7 +36,8 @@ pub fn run(flags: &ShotFlags, outputs: &Outputs) -> Result<Outcome> {
         ExposureChoice::Auto => None,
         ExposureChoice::Fixed(exposure) => Some(exposure),
     };
-    let frame = Frame { camera: camera(&viewpoint, &baked.scene)?, width, height, mode: flags.mode, exposure };
+    let camera = camera(&viewpoint, &baked.scene)?;
+    let frame = Frame { camera, width, height, mode: flags.mode, exposure, curve: flags.tone_curve };
 
     let stage = Stage::start("draw");
     let start = Instant::now();
@@ -107,7 +108,7 @@ pub fn camera(viewpoint: &Viewpoint, scene: &Scene) -> Result<Camera> {
 }
 
 /// The picture, and what drew it.
-fn draw(baked: &Baked, frame: &Frame, backend: Backend) -> Result<(Picture, String)> {
+pub fn draw(baked: &Baked, frame: &Frame, backend: Backend) -> Result<(Picture, String)> {
     let on_cpu = || Ok((viewer::draw_on_cpu(baked, frame), "cpu".to_owned()));
     let on_gpu = || -> Result<_, viewer::ViewerError> {
         let gpu = Gpu::headless()?;
@@ -123,7 +124,8 @@ fn draw(baked: &Baked, frame: &Frame, backend: Backend) -> Result<(Picture, Stri
     }
 }
 
-fn write(picture: &Picture, output: &Output) -> Result<(), FormatError> {
+/// Writes a picture as the kind of file that its name says.
+pub fn write(picture: &Picture, output: &Output) -> Result<(), FormatError> {
     output.write(|path| match ImageKind::of(path) {
         Some(ImageKind::Exr) => formats::write_exr(path, picture.width, picture.height, &picture.radiance),
         _ => formats::write_png(path, picture.width, picture.height, &picture.rgb),

@@ -9,6 +9,7 @@ mod architecture;
 mod cli;
 mod closed_forms;
 mod continuity;
+mod desktop;
 mod determinism;
 mod fixture;
 #[path = "../benches/common/generated/mod.rs"]
@@ -28,3 +29,4 @@ mod robustness;
 mod smooth_shading;
 mod textures;
 mod verify;
+mod window;

@@ -22,7 +22,14 @@ fn gpu() -> Option<Gpu> {
 }
 
 fn frame(baked: &Baked, mode: Mode) -> Frame {
-    Frame { camera: baked.scene.cameras[0].camera, width: 640, height: 480, mode, exposure: None }
+    Frame {
+        camera: baked.scene.cameras[0].camera,
+        width: 640,
+        height: 480,
+        mode,
+        exposure: None,
+        curve: scene::ToneCurve::default(),
+    }
 }
 
 /// At most 1/255 apart on 99.9 % of the pixels, and as many pixels of background.

@@ -1,7 +1,7 @@
 //! Headless pictures: a frame drawn by the adapter and read back.
 
 use glam::Vec3;
-use scene::{Baked, Camera, Exposure};
+use scene::{Baked, Camera, Exposure, ToneCurve};
 
 use crate::{
     Frame, Gpu, Mode, Picture, ViewerError,
@@ -22,7 +22,7 @@ pub fn draw_on_gpu(gpu: &Gpu, baked: &Baked, frame: &Frame) -> Result<Picture, V
     }
     let capture = Capture::new(gpu, baked, frame.width, frame.height)?;
     let exposure = frame.exposure.unwrap_or_else(|| Twin::new(baked).meter(&frame.camera, frame.width, frame.height));
-    capture.draw(&frame.camera, frame.mode, exposure)
+    capture.draw(&frame.camera, frame.mode, exposure, frame.curve)
 }
 
 /// A bake in an adapter's memory, and everything that pictures of one size need: for drawing many.
@@ -64,12 +64,18 @@ impl<'a> Capture<'a> {
     ///
     /// # Errors
     /// [`ViewerError::InvalidCamera`], and [`ViewerError::Driver`] when the driver fails.
-    pub fn draw(&self, camera: &Camera, mode: Mode, exposure: Exposure) -> Result<Picture, ViewerError> {
+    pub fn draw(
+        &self,
+        camera: &Camera,
+        mode: Mode,
+        exposure: Exposure,
+        curve: ToneCurve,
+    ) -> Result<Picture, ViewerError> {
         if !camera.is_valid() {
             return Err(ViewerError::InvalidCamera);
         }
         let (width, height) = (self.targets.width, self.targets.height);
-        let frame = Frame { camera: *camera, width, height, mode, exposure: Some(exposure) };
+        let frame = Frame { camera: *camera, width, height, mode, exposure: Some(exposure), curve };
         guarded(&self.gpu.device, || {
             let mut encoder = self.gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
             let view = self.output.create_view(&wgpu::TextureViewDescriptor::default());
@@ -180,7 +186,7 @@ mod tests {
     }
 
     fn frame(mode: Mode) -> Frame {
-        Frame { camera: camera(), width: 321, height: 203, mode, exposure: None }
+        Frame { camera: camera(), width: 321, height: 203, mode, exposure: None, curve: ToneCurve::default() }
     }
 
     #[test]
@@ -228,6 +234,20 @@ mod tests {
                 assert!(ours.background.abs_diff(twin.background) <= frame.pixels() as u64 / 1000);
             }
         }
+    }
+
+    #[test]
+    fn gpu_and_cpu_have_the_same_tone_curves() {
+        let Some(gpu) = gpu() else { return };
+        let pictures = ToneCurve::ALL.map(|curve| {
+            let frame = Frame { curve, ..frame(Mode::Shaded) };
+            let (ours, twin) = (draw_on_gpu(&gpu, &room(), &frame).unwrap(), draw_on_cpu(&room(), &frame));
+            let off = |(a, b): (&[u8; 3], &[u8; 3])| a.iter().zip(b).any(|(a, b)| a.abs_diff(*b) > 1);
+            let differing = ours.rgb.iter().zip(&twin.rgb).filter(|&pair| off(pair)).count();
+            assert!(differing <= frame.pixels() / 1000, "{curve:?}: {differing} pixels differ");
+            ours.rgb
+        });
+        assert!(pictures[0] != pictures[1] && pictures[1] != pictures[2] && pictures[2] != pictures[0]);
     }
 
     #[test]

@@ -28,7 +28,7 @@ pub(crate) struct FrameUniform {
     pub up: [f32; 3],
     pub is_light: u32,
     pub forward: [f32; 3],
-    pub padding: u32,
+    pub curve: u32,
     pub size: [f32; 2],
     pub padding_size: [f32; 2],
 }
@@ -51,7 +51,7 @@ impl FrameUniform {
             up: up.as_vec3().to_array(),
             is_light: frame.mode.is_light().into(),
             forward: forward.as_vec3().to_array(),
-            padding: 0,
+            curve: frame.curve as u32,
             size: [frame.width as f32, frame.height as f32],
             padding_size: [0.0; 2],
         }

@@ -1,7 +1,7 @@
 //! What is asked of a picture, and the picture.
 
 use glam::Vec3;
-use scene::{Camera, Exposure};
+use scene::{Camera, Exposure, ToneCurve};
 
 use crate::Mode;
 
@@ -18,6 +18,8 @@ pub struct Frame {
     pub mode: Mode,
     /// How bright it is; none meters it: surfaces that reflect, not the lamps, are brought to middle grey.
     pub exposure: Option<Exposure>,
+    /// How exposed light is brought into what a display shows.
+    pub curve: ToneCurve,
 }
 
 impl Frame {

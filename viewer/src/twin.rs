@@ -5,7 +5,7 @@
 
 use glam::{DVec2, Vec2, Vec3};
 use rayon::prelude::*;
-use scene::{Baked, Bvh, Camera, Exposure, encode_srgb, luminance, tone_curve};
+use scene::{Baked, Bvh, Camera, Exposure, encode_srgb, luminance};
 
 use crate::{
     Frame, Mode, Picture,
@@ -31,8 +31,8 @@ pub fn draw_on_cpu(baked: &Baked, frame: &Frame) -> Picture {
 
 /// A bake as the host sees it.
 pub(crate) struct Twin {
-    records: Records,
-    bvh: Bvh,
+    pub records: Records,
+    pub bvh: Bvh,
 }
 
 /// One pixel of the visibility buffer: the triangle's id plus one with [`BACK`] where its back is seen, 0 for nothing;
@@ -65,8 +65,8 @@ impl Twin {
             for (x, (radiance, rgb)) in radiance.iter_mut().zip(rgb).enumerate() {
                 let place = Vec2::new(x as f32 + 0.5, y as f32 + 0.5);
                 let seen = self.visibility(&frame.camera, place, frame.width, frame.height);
-                *radiance = self.colour(&uniform, frame.mode, seen, place);
-                *rgb = tone_map(*radiance, frame.mode, exposure);
+                *radiance = self.colour(&uniform, frame, seen, place);
+                *rgb = tone_map(*radiance, frame, exposure);
                 hits += u64::from(seen[0] != 0);
             }
             hits
@@ -119,7 +119,13 @@ impl Twin {
     }
 
     /// Pass (c): the radiance or display-linear colour of a pixel.
-    fn colour(&self, frame: &FrameUniform, mode: Mode, [id, barycentrics]: VisibilityPixel, place: Vec2) -> Vec3 {
+    fn colour(
+        &self,
+        uniform: &FrameUniform,
+        &Frame { mode, curve, .. }: &Frame,
+        [id, barycentrics]: VisibilityPixel,
+        place: Vec2,
+    ) -> Vec3 {
         if id == 0 || id & BACK != 0 {
             return Vec3::ZERO;
         }
@@ -127,8 +133,8 @@ impl Twin {
         let record = &self.records.triangles[id as usize];
         let (s, t) = unpack_barycentrics(barycentrics);
         let texture = self.texture(record, s, t);
-        let exposed = |radiance: Vec3| (radiance * frame.exposure).map(tone_curve);
-        let overlay = |colour| overlay(colour, frame, mode, record, &self.records.corners[id as usize], place);
+        let exposed = |radiance: Vec3| (radiance * uniform.exposure).map(|channel| curve.apply(channel));
+        let overlay = |colour| overlay(colour, uniform, mode, record, &self.records.corners[id as usize], place);
         match mode {
             Mode::Shaded => interpolant(record, texture, s, t),
             Mode::Gouraud => gouraud(record, texture, s, t),
@@ -140,7 +146,9 @@ impl Twin {
             }
             Mode::Mesh => overlay(exposed(interpolant(record, texture, s, t))),
             Mode::Discontinuities => overlay(0.35 * exposed(interpolant(record, texture, s, t))),
-            Mode::FalseColor => false_color(interpolant(record, texture, s, t), frame.exposure),
+            Mode::FalseColor => false_color(interpolant(record, texture, s, t), uniform.exposure),
+            Mode::Split if place.x < 0.5 * uniform.size[0] => gouraud(record, texture, s, t),
+            Mode::Split => interpolant(record, texture, s, t),
         }
     }
 }
@@ -267,8 +275,9 @@ fn edge_distances(frame: &FrameUniform, corners: &Corners, place: Vec2) -> [f32;
 }
 
 /// Pass (d): what a display shows.
-fn tone_map(colour: Vec3, mode: Mode, exposure: Exposure) -> [u8; 3] {
-    let shown = if mode.is_light() { (colour * exposure.factor()).map(tone_curve) } else { colour };
+fn tone_map(colour: Vec3, frame: &Frame, exposure: Exposure) -> [u8; 3] {
+    let exposed = |channel: f32| frame.curve.apply(channel * exposure.factor());
+    let shown = if frame.mode.is_light() { colour.map(exposed) } else { colour };
     shown.to_array().map(|channel| (encode_srgb(channel) * 255.0 + 0.5) as u8)
 }
 
@@ -277,12 +286,13 @@ mod tests {
     #![allow(clippy::unwrap_used)]
 
     use glam::DVec3;
+    use scene::ToneCurve;
 
     use super::*;
     use crate::test_room::{camera, room};
 
     fn frame(mode: Mode) -> Frame {
-        Frame { camera: camera(), width: 96, height: 64, mode, exposure: None }
+        Frame { camera: camera(), width: 96, height: 64, mode, exposure: None, curve: ToneCurve::default() }
     }
 
     #[test]

@@ -42,6 +42,7 @@ const ELEMENTS = 4u;
 const MESH = 5u;
 const DISCONTINUITIES = 6u;
 const FALSE_COLOR = 7u;
+const SPLIT = 8u;
 
 @compute @workgroup_size(8, 8)
 fn interpolate(@builtin(global_invocation_id) id: vec3<u32>) {
@@ -59,7 +60,7 @@ fn interpolate(@builtin(global_invocation_id) id: vec3<u32>) {
 }
 
 fn colour_at(id: u32, st: vec2<f32>, pixel: vec2<f32>) -> vec3<f32> {
-    if MODE == GOURAUD {
+    if MODE == GOURAUD || MODE == SPLIT && pixel.x < 0.5 * frame.size.x {
         return gouraud(id, st.x, st.y);
     } else if MODE == IDS {
         return id_colour(id);
