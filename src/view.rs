@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
-use std::sync::mpsc::{Sender, channel};
+use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread::JoinHandle;
 
 use anyhow::{Context, Result};
@@ -20,38 +20,34 @@ use crate::output::Outputs;
 use crate::pipeline::Onlooker;
 use crate::progress::say;
 use crate::shot;
-use crate::watch::watch;
+use crate::watch::Watch;
+
+/// What is said where no window can be opened, and the cure.
+const NO_WINDOW: &str = "no window (`halflight shot` draws a picture without one)";
 
 /// Opens a window; returns when it is closed.
 pub fn run(flags: &ViewFlags, outputs: &Outputs) -> Result<Outcome> {
     let viewpoint = flags.camera.viewpoint()?;
     let path = flags.input.clone();
+    let watch = Watch::over(&path);
+    // What is not there, and what is no bake, is said without a window.
+    let is_at_hand = formats::is_baked(&path) || !path.exists();
+    let input = if is_at_hand { Some(Input::read(&path, flags.reading)?) } else { None };
+    let mut system = WindowSystem::connect().context(NO_WINDOW)?;
     let (updates, received) = channel();
     let mut work = None;
-    // What is not there is said without a window.
-    if formats::is_baked(&path) || !path.exists() {
-        let baked = Input::read(&path, flags.reading)?.into_baked(&path, &LightFlags::default(), outputs)?;
+    if let Some(input) = input {
+        let baked = input.into_baked(&path, &LightFlags::default(), outputs)?;
         begin(&baked.scene, &viewpoint, &updates)?;
         tell(&updates, Update::Bake(Arc::new(baked)));
-        std::thread::spawn(move || watch(path, |path| reload(path, &updates)));
+        std::thread::spawn(move || watch.keep(|path| reload(path, &updates)));
     } else {
         work = Some(bake_behind(path, flags.reading, viewpoint, outputs.clone(), updates));
     }
-    let sources = LightSources::default();
-    let (pictures, outputs_of_pictures) = (flags.input.clone(), outputs.clone());
-    let walkthrough = Walkthrough {
-        name: title(&flags.input),
-        updates: received,
-        explain: Arc::new(move |baked, point| sources.at(baked, point)),
-        save: Arc::new(move |baked, frame, kind| {
-            save(baked, frame, kind, &pictures, &outputs_of_pictures).map_err(|error| sentence(&error))
-        }),
-        tell: Box::new(|what| say(what)),
-    };
-    let seen = WindowSystem::connect().and_then(|mut system| system.open(walkthrough));
+    let seen = system.open(walkthrough(&flags.input, received, outputs.clone()));
     // A bake that is not finished ends with the program, but not in the midst of a file.
     std::mem::forget(outputs.hold());
-    seen.context("no window (`halflight shot` draws a picture without one)")?;
+    seen.context(NO_WINDOW)?;
     match work.filter(JoinHandle::is_finished).map(JoinHandle::join) {
         Some(Ok(result)) => result.map(|()| Outcome::Done),
         // What a thread says when it panics stands on stderr already.
@@ -60,9 +56,19 @@ pub fn run(flags: &ViewFlags, outputs: &Outputs) -> Result<Outcome> {
     }
 }
 
-fn title(path: &Path) -> String {
-    let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
-    format!("{name} – Halflight")
+/// What the window of a file shows, and whom it asks.
+fn walkthrough(input: &Path, updates: Receiver<Update>, outputs: Outputs) -> Walkthrough {
+    let name = input.file_name().unwrap_or(input.as_os_str()).to_string_lossy();
+    let (sources, input) = (LightSources::default(), input.to_owned());
+    Walkthrough {
+        name: format!("{name} – Halflight"),
+        updates,
+        explain: Arc::new(move |baked, point| sources.at(baked, point)),
+        save: Arc::new(move |baked, frame, kind| {
+            save(baked, frame, kind, &input, &outputs).map_err(|error| sentence(&error))
+        }),
+        tell: Box::new(|what| say(what)),
+    }
 }
 
 /// Tells the window something; nobody's loss if it is closed.

@@ -10,13 +10,29 @@ const EVERY: Duration = Duration::from_millis(200);
 type Stamp = Option<(SystemTime, u64)>;
 
 /// A file, as it was when it was last read, and when it was last looked at.
-struct Watch {
+pub struct Watch {
+    path: PathBuf,
     read: Stamp,
     seen: Stamp,
 }
 
 impl Watch {
-    /// Looks at the file: whether it is another one than was read, and the same as at the last look.
+    /// A watch over a file that is read after this.
+    pub fn over(path: &Path) -> Self {
+        Self { path: path.to_owned(), read: stamp(path), seen: None }
+    }
+
+    /// Calls `changed` whenever the file has changed, until it returns false; for a thread of its own.
+    pub fn keep(mut self, mut changed: impl FnMut(&Path) -> bool) {
+        loop {
+            std::thread::sleep(EVERY);
+            if self.look(stamp(&self.path)) && !changed(&self.path) {
+                return;
+            }
+        }
+    }
+
+    /// Whether the file, as it is now, is another one than was read, and the same as at the last look.
     fn look(&mut self, now: Stamp) -> bool {
         let settled = now.is_some() && now == self.seen && now != self.read;
         self.seen = now;
@@ -24,17 +40,6 @@ impl Watch {
             self.read = now;
         }
         settled
-    }
-}
-
-/// Calls `changed` whenever a file has changed, until it returns false; for a thread of its own.
-pub fn watch(path: PathBuf, mut changed: impl FnMut(&Path) -> bool) {
-    let mut watch = Watch { read: stamp(&path), seen: None };
-    loop {
-        std::thread::sleep(EVERY);
-        if watch.look(stamp(&path)) && !changed(&path) {
-            return;
-        }
     }
 }
 
@@ -50,7 +55,7 @@ mod tests {
     #[test]
     fn a_file_has_changed_once_it_is_whole() {
         let at = |seconds, length| Some((SystemTime::UNIX_EPOCH + Duration::from_secs(seconds), length));
-        let mut watch = Watch { read: at(1, 10), seen: None };
+        let mut watch = Watch { path: PathBuf::new(), read: at(1, 10), seen: None };
         let looks = [
             at(1, 10),
             at(1, 10),

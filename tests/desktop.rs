@@ -179,15 +179,15 @@ impl Window<'_> {
         flags.lines().next().unwrap().split(' ').map(str::to_owned).collect()
     }
 
-    /// Waits until the picture is no longer another from look to look.
+    /// Waits until the picture has been the same for three looks in a row, and is not black.
     pub fn picture_at_rest(&mut self, folder: &Path) -> Vec<[u8; 3]> {
-        let mut last = Vec::new();
+        let (mut last, mut same) = (Vec::new(), 0);
         self.wait_for("picture at rest", |window| {
-            std::thread::sleep(Duration::from_millis(200));
+            std::thread::sleep(4 * LOOK);
             let picture = window.desktop.picture(folder);
-            let rests = picture == last && picture.iter().any(|pixel| *pixel != [0; 3]);
+            same = if picture == last { same + 1 } else { 0 };
             last = picture;
-            rests.then(|| last.clone())
+            (same >= 2 && last.iter().any(|pixel| *pixel != [0; 3])).then(|| last.clone())
         })
     }
 

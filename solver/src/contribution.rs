@@ -117,4 +117,26 @@ mod tests {
         assert_eq!(lamp.reflected, Rgb::ZERO);
         assert!(lamp.blockers.contains(&1) || lamp.blockers.contains(&2), "{:?}", lamp.blockers);
     }
+
+    /// So many boxes that nothing is linked, under a lamp that is near and a row of faint ones.
+    #[test]
+    fn sources_sum_up_without_links_too() {
+        let mut builder = lit_floor();
+        for i in 0..72 {
+            let (x, y) = (f64::from(i % 12) * 0.4 - 2.5, 1.0 + f64::from(i / 12) * 0.3);
+            builder = builder.material(0.5, if i % 9 == 0 { 1e-4 } else { 0.0 });
+            builder = builder.cuboid([x, y, 0.2], [x + 0.1, y + 0.1, 0.3], false);
+        }
+        let scene = builder.build();
+        let solution = solve(&scene, &SolveOptions::default(), &|_| ());
+        assert_eq!(solution.visibility, crate::Visibility::Rays);
+        let gather = Gather::new(&scene, &solution);
+        for point in [DVec3::new(0.1, 0.2, 0.0), DVec3::new(-1.0, -0.7, 0.0)] {
+            let parts = gather.contributions_at(0, point, DVec3::X);
+            let whole = gather.irradiance_at(0, point, DVec3::X);
+            let sum: Rgb = parts.iter().map(Contribution::irradiance).sum();
+            assert!((sum - whole).length() < 1e-9 * whole.length(), "{point}: {sum} {whole}");
+            assert!(parts.len() > 1, "{parts:?}");
+        }
+    }
 }

@@ -1,6 +1,16 @@
 //! Numbers as a person reads them: with the digits that count.
 
+use glam::DVec3;
 use scene::Rgb;
+
+/// A place with so many digits after the point, and no zero below zero.
+pub(crate) fn place(at: DVec3, digits: usize, between: &str) -> String {
+    let number = |value: f64| {
+        let text = format!("{value:.digits$}");
+        if text.trim_matches(['-', '0', '.']).is_empty() { text.trim_start_matches('-').to_owned() } else { text }
+    };
+    at.to_array().map(number).join(between)
+}
 
 /// Three channels, each with three digits that count.
 pub(crate) fn colour(Rgb { x, y, z }: Rgb) -> String {
@@ -25,6 +35,11 @@ impl std::fmt::Display for Number {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn places_have_no_negative_zero() {
+        assert_eq!(place(DVec3::new(-0.0004, 1.0, -1.25), 3, ","), "0.000,1.000,-1.250");
+    }
 
     #[test]
     fn numbers_have_the_digits_that_count() {

@@ -69,7 +69,7 @@ struct View {
 
 impl View {
     /// Right, up and ahead of the eye, metres.
-    fn from_eye(&self, point: DVec3) -> DVec3 {
+    fn seen_from_eye(&self, point: DVec3) -> DVec3 {
         let (right, up, forward) = self.camera.basis();
         let way = point - self.camera.eye;
         DVec3::new(way.dot(right), way.dot(up), way.dot(forward))
@@ -82,13 +82,13 @@ impl View {
     }
 
     fn place(&self, point: DVec3) -> Option<Pos2> {
-        let p = self.from_eye(point);
+        let p = self.seen_from_eye(point);
         (p.z > NEAR).then(|| self.on_screen(p))
     }
 
     /// The part of a line that is ahead of the eye.
     fn line(&self, a: DVec3, b: DVec3) -> Option<[Pos2; 2]> {
-        let (a, b) = (self.from_eye(a), self.from_eye(b));
+        let (a, b) = (self.seen_from_eye(a), self.seen_from_eye(b));
         if a.z.max(b.z) <= NEAR {
             return None;
         }

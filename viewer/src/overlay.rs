@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 
-use egui::{Color32, CornerRadius, FontFamily, FontId, Stroke, TextStyle, ViewportId, Visuals};
+use egui::{Color32, CornerRadius, FontFamily, FontId, Order, Pos2, Stroke, TextStyle, ViewportId, Visuals};
 use winit::{event::WindowEvent, window::Window};
 
 use crate::{command::Command, marks, pace::Pace, painting::Painting, panels, walk::Walk};
@@ -16,6 +16,8 @@ pub(crate) struct Overlay {
     context: egui::Context,
     state: egui_winit::State,
     window: Arc<Window>,
+    /// Where the cursor is, points.
+    cursor: Pos2,
 }
 
 impl Overlay {
@@ -41,17 +43,24 @@ impl Overlay {
         });
         let scale = window.scale_factor() as f32;
         let state = egui_winit::State::new(context.clone(), ViewportId::ROOT, &*window, Some(scale), None, None);
-        Self { context, state, window }
+        Self { context, state, window, cursor: Pos2::ZERO }
     }
 
     /// Notes an event: whether it is a panel's, and whether panels change by it.
     pub fn follow(&mut self, event: &WindowEvent) -> (bool, bool) {
         let response = self.state.on_window_event(&self.window, event);
+        if let WindowEvent::CursorMoved { position, .. } = event {
+            let scale = self.context.pixels_per_point();
+            self.cursor = Pos2::new(position.x as f32, position.y as f32) / scale;
+        }
         let over_panel = match event {
-            WindowEvent::KeyboardInput { .. } => self.context.egui_wants_keyboard_input(),
-            _ => self.context.egui_wants_pointer_input() || self.context.is_pointer_over_egui(),
+            WindowEvent::KeyboardInput { .. } => self.context.text_edit_focused(),
+            // By where the cursor is now: what egui itself says is as old as the last frame.
+            _ => {
+                let layer = self.context.layer_id_at(self.cursor);
+                self.context.egui_is_using_pointer() || layer.is_some_and(|layer| layer.order != Order::Background)
+            }
         };
-        // Tab is a key of ours, and would else walk through the panels.
         (over_panel, response.repaint)
     }
 

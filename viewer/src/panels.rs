@@ -8,7 +8,7 @@ use scene::{LUMINOUS_EFFICACY, Rgb, ToneCurve, luminance};
 use crate::{
     Mode, PictureKind,
     command::{Command, KEYS},
-    digits::{Number, colour},
+    digits::{Number, colour, place},
     marks::{self, colour_of},
     pace::{PARTS, Pace},
     walk::{Clicked, Walk},
@@ -197,8 +197,7 @@ fn light(ui: &mut Ui, clicked: &Clicked) {
         row("object", reading.object.clone());
         row("leaf", format!("{} of polygon {}", reading.leaf, reading.polygon));
         row("triangle", reading.point.triangle.to_string());
-        let position = reading.position;
-        row("place", format!("{:.3} {:.3} {:.3} m", position.x, position.y, position.z));
+        row("place", format!("{} m", place(reading.position, 3, "  ")));
     });
 }
 

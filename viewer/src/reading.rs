@@ -7,9 +7,12 @@ use scene::{Baked, Camera, LUMINOUS_EFFICACY, Rgb, luminance};
 
 use crate::{
     LightSource, SurfacePoint,
-    digits::{Number, colour},
+    digits::{Number, colour, place},
     twin::Twin,
 };
+
+/// How far the same place of another bake may lie away, as a part of the scene's size: meshes round their vertices.
+const REACH: f64 = 1e-4;
 
 /// Sources that are named in a sentence.
 const NAMED: usize = 5;
@@ -20,6 +23,8 @@ pub(crate) struct Reading {
     pub point: SurfacePoint,
     /// Metres.
     pub position: DVec3,
+    /// Corners of the triangle, metres.
+    corners: [DVec3; 3],
     pub material: String,
     pub object: String,
     pub polygon: u32,
@@ -40,25 +45,39 @@ impl Reading {
     pub fn at(baked: &Baked, twin: &Twin, camera: &Camera, place: DVec2, (width, height): (u32, u32)) -> Option<Self> {
         let ray = camera.ray(place, width, height);
         let hit = twin.bvh.closest_hit(&ray, 0.0).filter(|hit| hit.normal.dot(ray.direction) < 0.0)?;
+        let point = SurfacePoint { triangle: hit.id, s: hit.s, t: hit.t };
+        Some(Self::of(baked, point, ray.at(hit.distance)))
+    }
+
+    /// Reads the same place of another bake of the scene; nothing where it has no such surface.
+    pub fn again(&self, baked: &Baked, twin: &Twin) -> Option<Self> {
+        let [a, b, c] = self.corners;
+        let (normal, reach) = ((b - a).cross(c - a).normalize_or_zero(), REACH * baked.scene.size());
+        let (triangle, s, t) = baked.locate(&twin.bvh, self.position, normal, reach)?;
+        Some(Self::of(baked, SurfacePoint { triangle, s, t }, self.position))
+    }
+
+    fn of(baked: &Baked, point: SurfacePoint, position: DVec3) -> Self {
         let scene = &baked.scene;
-        let triangle = baked.triangles.get(hit.id as usize)?;
-        let (polygon, position) = (triangle.polygon, ray.at(hit.distance));
+        let SurfacePoint { triangle, s, t } = point;
+        let polygon = baked.triangles[triangle as usize].polygon;
         let material = scene.material(polygon);
         let texture = scene.texture_map(polygon).map_or(Rgb::ONE, |(texture, map)| {
             scene.textures[texture as usize].sample(map.at(position).as_vec2()).as_dvec3()
         });
-        Some(Self {
-            point: SurfacePoint { triangle: hit.id, s: hit.s, t: hit.t },
+        Self {
+            point,
             position,
+            corners: baked.corners(triangle),
             material: material.name.clone(),
             object: scene.objects[scene.polygons[polygon as usize].object as usize].clone(),
             polygon,
-            leaf: triangle.element,
-            irradiance: baked.irradiance(hit.id, hit.s, hit.t),
+            leaf: baked.triangles[triangle as usize].element,
+            irradiance: baked.irradiance(triangle, s, t),
             reflectance: material.reflectance * texture,
             emitted: material.radiance,
-            error: (baked.error.points > 0).then(|| baked.triangle_errors[hit.id as usize]),
-        })
+            error: (baked.error.points > 0).then(|| baked.triangle_errors[triangle as usize]),
+        }
     }
 
     /// What leaves the surface, ρE + π·Ke, W·m⁻².
@@ -78,10 +97,10 @@ impl Reading {
 
     /// The reading in a line.
     pub fn sentence(&self) -> String {
-        let DVec3 { x, y, z } = self.position;
         format!(
-            "{:.5} lx at {x:.5},{y:.5},{z:.5}: {}, irradiance {} W/m², luminance {:.4} cd/m²",
+            "{:.5} lx at {}: {}, irradiance {} W/m², luminance {:.4} cd/m²",
             Number(self.illuminance()),
+            place(self.position, 5, ","),
             self.material,
             colour(self.irradiance),
             Number(self.luminance())

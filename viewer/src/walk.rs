@@ -139,15 +139,10 @@ impl Walk {
             });
             self.flight = Some(Flight::new(camera, scene.size()));
         }
-        // A point is read again where it was: its triangle may be gone, its place is not.
-        if let Some(clicked) = self.clicked.take() {
-            let position = clicked.reading.position;
-            let towards = self.flight.map_or(DVec3::Z, |flight| position - flight.camera.eye);
-            let eye = position - towards.normalize_or(DVec3::Z) * (1e-3 * scene.size());
-            let camera = Camera { eye, target: position, up: towards.any_orthogonal_vector(), vertical_fov: 1.0 };
-            let reading = Reading::at(&shown.baked, &shown.twin, &camera, DVec2::splat(0.5), (1, 1));
-            self.clicked = reading.map(|reading| Clicked { reading, sources: clicked.sources });
-        }
+        // Its triangle may be gone, but its place is not.
+        self.clicked = self.clicked.take().and_then(|Clicked { reading, sources }| {
+            Some(Clicked { reading: reading.again(&shown.baked, &shown.twin)?, sources })
+        });
         self.shown = Some(shown);
     }
 
