@@ -320,6 +320,32 @@ mod tests {
         }
     }
 
+    /// What is watched is a bake at any time, finer and finer, in the end the measured one; and it changes nothing.
+    #[test]
+    fn a_bake_may_be_watched() {
+        let scene = floor_lamp_and_plate();
+        let (alone, _) = baked_with(&scene, &BakeOptions::default(), None);
+        let solution = solve(&scene, &SolveOptions::default(), &|_| ());
+        let flat = crate::flat_bake(&scene, &solution);
+        let shown = std::sync::Mutex::new(vec![flat]);
+        let watch = |baked| shown.lock().unwrap().push(baked);
+        let control = Control { progress: &|_| (), stop: &|| false, interrupted: &|| false, watch: Some(&watch) };
+        assert_eq!(bake(&scene, solution, &BakeOptions::default(), control).baked, alone);
+        let shown = shown.into_inner().unwrap();
+        for baked in &shown {
+            baked.validate().unwrap();
+            let ids = 0..baked.triangles.len() as u32;
+            let area: f64 = ids.map(|triangle| scene::area_vector(&baked.corners(triangle)).length()).sum();
+            assert!((area / scene.surface_area() - 1.0).abs() < 1e-6);
+            assert!(baked.mean_irradiance().min_element() > 0.5 * alone.mean_irradiance().min_element());
+        }
+        assert!(shown.len() > 2, "{} bakes were shown", shown.len());
+        assert!(shown.windows(2).all(|pair| pair[0].triangles.len() <= pair[1].triangles.len()));
+        assert_eq!(shown.last(), Some(&alone));
+        let nothing = solve(&Scene::default(), &SolveOptions::default(), &|_| ());
+        assert!(crate::flat_bake(&Scene::default(), &nothing).triangles.is_empty());
+    }
+
     #[test]
     fn following_discontinuities_saves_triangles() {
         let scene = floor_lamp_and_plate();
