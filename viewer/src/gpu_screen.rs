@@ -141,7 +141,9 @@ impl GpuScreen {
             let exposed = frame.and_then(|frame| Some((frame, frame.exposure?)));
             let drawn = match (exposed, &self.bake) {
                 (Some((frame, exposure)), Some(bake)) => {
-                    encode_frame(&gpu, &mut encoder, bake, targets, frame, exposure, &output);
+                    // The window may have another size already than the one that is told next.
+                    let frame = Frame { width: targets.width, height: targets.height, ..*frame };
+                    encode_frame(&gpu, &mut encoder, bake, targets, &frame, exposure, &output);
                     true
                 }
                 _ => false,
