@@ -98,8 +98,9 @@ pub fn read_camera_path(path: &Path) -> Result<CameraPath, FormatError> {
 /// Whatever the file system has against it.
 pub fn write_camera_path(path: &Path, cameras: &CameraPath) -> Result<(), FormatError> {
     let file = WrittenPath { camera: cameras.keys().iter().map(entry).collect() };
-    let text = toml::to_string(&file)
-        .map_err(|error| FormatError::content(path, format!("cannot be written: {error}"), "give numbers that are finite"))?;
+    let text = toml::to_string(&file).map_err(|error| {
+        FormatError::content(path, format!("cannot be written: {error}"), "give numbers that are finite")
+    })?;
     write_atomically(path, |to| to.write_all(text.as_bytes()).map_err(|error| FormatError::write(path, error)))
 }
 

@@ -47,7 +47,9 @@ impl std::fmt::Display for CameraPathError {
         match self {
             Self::Empty => write!(f, "a path without cameras leads nowhere"),
             Self::Camera(key) => write!(f, "camera {} of the path sees nothing", key + 1),
-            Self::Time(key) => write!(f, "the time of camera {} of the path is no number of seconds after the one before", key + 1),
+            Self::Time(key) => {
+                write!(f, "the time of camera {} of the path is no number of seconds after the one before", key + 1)
+            }
         }
     }
 }

@@ -308,7 +308,7 @@ impl Stage {
         let surface = instance.create_surface(window.clone());
         let surface = surface.map_err(|cause| ViewerError::NoAdapter(cause.to_string()))?;
         let gpu = Gpu::open(&instance, Some(&surface))?;
-        let bake = ResidentBake::upload(&gpu, &Records::of(baked))?;
+        let bake = ResidentBake::upload(&gpu, &Arc::new(Records::of(baked)))?;
         let format = surface_format(&surface, &gpu.adapter)?;
         let configuration = wgpu::SurfaceConfiguration {
             usage: wgpu::TextureUsages::RENDER_ATTACHMENT,
@@ -359,17 +359,18 @@ impl Stage {
                 return self.configure().map(|()| false);
             }
         };
-        guarded(&self.gpu.device, || {
+        guarded(&self.gpu.device, || -> Result<(), ViewerError> {
             let output = texture.texture.create_view(&wgpu::TextureViewDescriptor {
                 format: self.configuration.view_formats.first().copied(),
                 ..Default::default()
             });
             let mut encoder = self.gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-            encode_frame(&self.gpu, &mut encoder, &self.bake, targets, frame, exposure, &output);
+            encode_frame(&self.gpu, &mut encoder, &self.bake, targets, frame, exposure, &output)?;
             self.gpu.queue.submit([encoder.finish()]);
             self.window.pre_present_notify();
             self.gpu.queue.present(texture);
-        })?;
+            Ok(())
+        })??;
         if outdated {
             self.configure()?;
         }
