@@ -3,10 +3,12 @@
 //! Exit codes: 0 done, 1 failed, 2 wrong usage, 3 a comparison or verification did not hold, 130 interrupted.
 
 mod args;
+mod artist;
 mod bake;
 mod compare;
 mod error_picture;
 mod failure;
+mod frame_timing;
 mod ground_truth;
 mod info;
 mod input;

@@ -12,6 +12,7 @@ use scene::{Baked, Scene};
 use viewer::{Frame, PictureKind, Update, Walkthrough, WindowSystem};
 
 use crate::args::{Backend, LightFlags, SceneFlags, ViewFlags, Viewpoint};
+use crate::artist::Studio;
 use crate::bake::missed;
 use crate::failure::{Outcome, Usage, sentence};
 use crate::input::{Input, bake_once, read_scene, require_light};
@@ -161,7 +162,8 @@ fn save(baked: &Baked, frame: &Frame, kind: PictureKind, input: &Path, outputs: 
     let names = (1..=u32::MAX).map(|number| PathBuf::from(format!("{stem}-{number}.{end}")));
     let path = names.into_iter().find(|path| !path.exists()).context("every name is taken")?;
     let output = outputs.claim(&path)?;
-    let (picture, _) = shot::draw(baked, frame, Backend::Auto)?;
+    let studio = Studio::open(baked, Backend::Auto)?;
+    let picture = studio.artist((frame.width, frame.height))?.draw(frame, kind == PictureKind::Exr)?;
     shot::write(&picture, &output)?;
     Ok(format!("{} is written, EV {:.3}", path.display(), picture.exposure.ev))
 }

@@ -7,6 +7,7 @@
 mod baked;
 mod bvh;
 mod camera;
+mod camera_path;
 mod exposure;
 mod half_edge;
 mod interpolant;
@@ -24,6 +25,7 @@ mod weld;
 pub use baked::{Baked, BakedElement, BakedError, BakedTriangle, DiscontinuityLine, EdgeKind, LineKind, Provenance};
 pub use bvh::{Bvh, Hit};
 pub use camera::{Camera, NamedCamera};
+pub use camera_path::{CameraKey, CameraPath, CameraPathError};
 pub use exposure::{Exposure, MIDDLE_GREY, ToneCurve, decode_srgb, encode_srgb};
 pub use half_edge::{HalfEdges, NO_TWIN};
 pub use interpolant::{Interpolant, SAMPLE_BARYCENTRICS};

@@ -132,7 +132,7 @@ impl GpuScreen {
             wgpu::CurrentSurfaceTexture::Lost => return self.make_anew(true),
         };
         self.anew = 0;
-        guarded(&gpu.device, || {
+        guarded(&gpu.device, || -> Result<(), ViewerError> {
             let output = texture.texture.create_view(&wgpu::TextureViewDescriptor {
                 format: self.configuration.view_formats.first().copied(),
                 ..Default::default()
@@ -143,7 +143,7 @@ impl GpuScreen {
                 (Some((frame, exposure)), Some(bake)) => {
                     // The window may have another size already than the one that is told next.
                     let frame = Frame { width: targets.width, height: targets.height, ..*frame };
-                    encode_frame(&gpu, &mut encoder, bake, targets, &frame, exposure, &output);
+                    encode_frame(&gpu, &mut encoder, bake, targets, &frame, exposure, &output)?;
                     true
                 }
                 _ => false,
@@ -152,7 +152,8 @@ impl GpuScreen {
             self.overlay.encode(&gpu, encoder, &painting, size, &output, !drawn);
             self.window.pre_present_notify();
             gpu.queue.present(texture);
-        })?;
+            Ok(())
+        })??;
         if outdated {
             self.configure()?;
         }

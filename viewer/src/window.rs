@@ -342,8 +342,10 @@ impl ApplicationHandler<Event> for Session {
                 redraw = true;
             }
             WindowEvent::Occluded(false) => redraw = true,
+            // A key that is held while the window is entered is no key that is pressed in it.
             WindowEvent::KeyboardInput {
                 event: KeyEvent { physical_key: PhysicalKey::Code(key), state, repeat, .. },
+                is_synthetic: false,
                 ..
             } => {
                 let (shift, control) = self.hands.modifiers();
