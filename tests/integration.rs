@@ -11,6 +11,7 @@ mod closed_forms;
 mod continuity;
 mod determinism;
 mod fixture;
+mod frames;
 #[path = "../benches/common/generated/mod.rs"]
 mod generated;
 mod generated_scenes;
