@@ -177,7 +177,7 @@ pub struct ShotFlags {
     pub tone_curve: ToneCurve,
     /// Picture to compare with: an EXR by the relative RMSE of radiance, a PNG by the share of pixels off by more
     /// than 1/255
-    #[arg(long, value_name = "REFERENCE", value_parser = image_path, requires = "max_error")]
+    #[arg(long, value_name = "REFERENCE", value_parser = image_path, requires_all = ["max_error", "output"])]
     pub compare: Option<PathBuf>,
     /// Largest difference from the reference that is accepted; exit code 3 above it
     #[arg(long, value_name = "E", value_parser = non_negative, requires = "compare", allow_hyphen_values = true)]

@@ -12,6 +12,7 @@ mod continuity;
 mod desktop;
 mod determinism;
 mod fixture;
+mod frames;
 #[path = "../benches/common/generated/mod.rs"]
 mod generated;
 mod generated_scenes;

@@ -16,8 +16,9 @@ use crate::{
     visibility_pass::BACK,
 };
 
-/// Pixels that are evaluated at a time, for the processor to do several at once; a short span wastes the rest of them.
-const LANES: usize = 8;
+/// Pixels that are evaluated at a time: as many as a processor has numbers in a register everywhere. More waste what a short
+/// span leaves over.
+const LANES: usize = 4;
 
 /// The least denominator: that of a triangle seen from its edge, which no pixel's centre meets.
 const LEAST: f32 = 1e-30;
