@@ -15,7 +15,7 @@ const MAY_NAME: [(&str, &[&str]); 6] = [
 ];
 
 /// Crates of others that one of ours alone knows.
-const ONE_HOME: [(&str, &str); 9] = [
+const ONE_HOME: [(&str, &str); 11] = [
     ("obvhs", "scene"),
     ("tobj", "formats"),
     ("image", "formats"),
@@ -24,6 +24,8 @@ const ONE_HOME: [(&str, &str); 9] = [
     ("spade", "mesher"),
     ("wgpu", "viewer"),
     ("winit", "viewer"),
+    ("egui", "viewer"),
+    ("softbuffer", "viewer"),
     ("clap", "halflight"),
 ];
 

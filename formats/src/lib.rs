@@ -7,6 +7,7 @@ mod atomic_file;
 mod attributes;
 mod baked_file;
 mod camera;
+mod camera_path_file;
 mod convex;
 mod error;
 mod face;
@@ -31,6 +32,7 @@ mod unfinished;
 
 pub use atomic_file::write_atomically;
 pub use baked_file::{is_baked, read_baked, read_unfinished, write_baked, write_unfinished};
+pub use camera_path_file::{read_camera_path, write_camera_path};
 pub use error::FormatError;
 pub use face_count::count_faces;
 pub use image_file::{read_exr, read_png, write_exr, write_png};

@@ -45,7 +45,7 @@ use crate::obj::read_obj;
 use crate::report::ImportReport;
 
 /// Vertical opening angle of a camera that names none, degrees: wide enough for a room, not yet distorting.
-const DEFAULT_FOV: f64 = 60.0;
+pub(crate) const DEFAULT_FOV: f64 = 60.0;
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]

@@ -3,8 +3,7 @@
 //! After each round (`rounds`) the whole is measured (`residual`, `claimed_error`). Where it misses the tolerance, the next
 //! round asks for less. Rounds are global: what is divided depends on the light alone, never on threads.
 
-use glam::Vec3;
-use scene::{Answers, Baked, BakedElement, BakedError, BakedTriangle, Provenance, Rgb, Scene};
+use scene::{Answers, Baked, BakedError, Rgb, Scene};
 use solver::{Solution, Visibility};
 
 use crate::claimed_error::{P99, mean_reflectance, measured};
@@ -15,7 +14,7 @@ use crate::probe::colour_mean;
 use crate::reflected_light::ReflectedLight;
 use crate::residual::residual;
 use crate::rounds::Rounds;
-use crate::{Leaf, Mesh, MeshStatistics, Progress, Weight};
+use crate::{MeshStatistics, Progress, Weight};
 
 /// What a bake is asked for.
 #[derive(Clone, Debug, PartialEq)]
@@ -68,7 +67,7 @@ const NEXT_SOURCE_SHARE: f64 = 0.3;
 const BIAS: f64 = 0.25;
 
 /// The error of a bake that was stopped before it was measured.
-const UNMEASURED: BakedError =
+pub(crate) const UNMEASURED: BakedError =
     BakedError { rms: f64::INFINITY, p99: f64::INFINITY, max: f64::INFINITY, points: 0, holds: false };
 
 impl Default for BakeOptions {
@@ -94,6 +93,9 @@ pub struct Control<'a> {
     pub stop: &'a (dyn Fn() -> bool + Sync),
     /// Whether to stop at once with the best that is known: asked all the time, from any thread.
     pub interrupted: &'a (dyn Fn() -> bool + Sync),
+    /// Is shown the bake as it grows, each time that its mesh or its light has changed: coarse to fine, and with an error once it
+    /// is measured. What is shown is a copy: nothing depends on whether anybody looks.
+    pub watch: Option<&'a (dyn Fn(Baked) + Sync)>,
 }
 
 /// A bake, the solution as it was refined for it, and counts.
@@ -161,6 +163,7 @@ pub fn resume(
     let mut rounds = Rounds {
         scene,
         options,
+        watch: control.watch,
         inquiry: Inquiry::new(control, &solution, answers, options.max_bytes),
         emitted: EmittedLight::default(),
         reflected: ReflectedLight::new(&solution, front),
@@ -187,6 +190,9 @@ pub fn resume(
         }
         let (error, bias) = measured(&points, options.tolerance, rounds.reflectance);
         statistics.rounds += 1;
+        if let Some(watch) = control.watch {
+            watch(rounds.baked(&fine, &samples, error));
+        }
         let too_many = fine.triangles() > options.max_triangles;
         let missed = |error: &BakedError| (error.rms / options.tolerance).max(error.p99 / (P99 * options.tolerance));
         let (last, stop) = (missed(&error), error.holds || too_many || statistics.rounds == ROUNDS || (control.stop)());
@@ -209,65 +215,19 @@ pub fn resume(
         }
     };
     (control.progress)(1.0);
-    let samples: Vec<Vec3> = samples.iter().map(|value| value.max(Rgb::ZERO).as_vec3()).collect();
-    let (vertices, triangles) = stored_triangles(&fine.leaves, &fine.mesh, &fine.table.triangles);
     let statistics = BakeStatistics {
         discontinuities_found: rounds.lines.all().len(),
         discontinuities_kept: fine.lines.len(),
-        vertices: vertices.len(),
-        triangles: triangles.len(),
+        triangles: fine.triangles(),
         samples: samples.len(),
         rows: rounds.reflected.rows(),
         bytes: rounds.inquiry.peak(),
         mesh: fine.mesh.statistics,
         ..statistics
     };
-    let solution = &rounds.solution;
-    let light = if solution.reflects() { &solution.light } else { &solution.irradiance };
-    let element = |leaf: &Leaf| BakedElement {
-        polygon: leaf.polygon,
-        irradiance: light[leaf.element as usize].irradiance.as_vec3(),
-    };
-    let triangle_errors = rounds.triangle_errors(&fine, &samples);
-    let baked = Baked {
-        scene: scene.clone(),
-        vertices,
-        samples,
-        triangle_errors,
-        triangles,
-        elements: fine.leaves.iter().map(element).collect(),
-        lines: fine.lines,
-        error,
-        provenance: Provenance::default(),
-    };
+    let baked = rounds.baked(&fine, &samples, error);
+    let statistics = BakeStatistics { vertices: baked.vertices.len(), ..statistics };
     Bake { baked, solution: rounds.solution, statistics, answers: rounds.inquiry.into_answers() }
-}
-
-/// The mesh as it is stored: without the vertices that no triangle uses.
-fn stored_triangles(leaves: &[Leaf], mesh: &Mesh, samples: &[[u32; 6]]) -> (Vec<Vec3>, Vec<BakedTriangle>) {
-    const UNUSED: u32 = u32::MAX;
-    let mut stored = vec![UNUSED; mesh.vertices.len()];
-    let mut vertices = Vec::new();
-    let triangles = mesh
-        .triangles
-        .iter()
-        .zip(samples)
-        .map(|(triangle, &samples)| BakedTriangle {
-            vertices: triangle.vertices.map(|vertex| {
-                let id = &mut stored[vertex as usize];
-                if *id == UNUSED {
-                    *id = vertices.len() as u32;
-                    vertices.push(mesh.vertices[vertex as usize].as_vec3());
-                }
-                *id
-            }),
-            samples,
-            polygon: leaves[triangle.leaf as usize].polygon,
-            element: triangle.leaf,
-            edges: triangle.edges,
-        })
-        .collect();
-    (vertices, triangles)
 }
 
 #[cfg(test)]
@@ -314,8 +274,12 @@ mod tests {
     fn baked_with(scene: &Scene, options: &BakeOptions, bounces: Option<u32>) -> (Baked, BakeStatistics) {
         let solution = solve(scene, &SolveOptions { bounces, ..SolveOptions::default() }, &|_| ());
         let progress = |fraction| assert!((0.0..=1.0).contains(&fraction));
-        let bake =
-            bake(scene, solution, options, Control { progress: &progress, stop: &|| false, interrupted: &|| false });
+        let bake = bake(
+            scene,
+            solution,
+            options,
+            Control { progress: &progress, stop: &|| false, interrupted: &|| false, watch: None },
+        );
         (bake.baked, bake.statistics)
     }
 
@@ -341,6 +305,32 @@ mod tests {
             let area: f64 = of_polygon.map(|triangle| scene::area_vector(&baked.corners(triangle)).length()).sum();
             assert!((area / scene.area(polygon) - 1.0).abs() < 1e-6, "the rounding to f32");
         }
+    }
+
+    /// What is watched is a bake at any time, finer and finer, in the end the measured one; and it changes nothing.
+    #[test]
+    fn a_bake_may_be_watched() {
+        let scene = floor_lamp_and_plate();
+        let (alone, _) = baked_with(&scene, &BakeOptions::default(), None);
+        let solution = solve(&scene, &SolveOptions::default(), &|_| ());
+        let flat = crate::flat_bake(&scene, &solution);
+        let shown = std::sync::Mutex::new(vec![flat]);
+        let watch = |baked| shown.lock().unwrap().push(baked);
+        let control = Control { progress: &|_| (), stop: &|| false, interrupted: &|| false, watch: Some(&watch) };
+        assert_eq!(bake(&scene, solution, &BakeOptions::default(), control).baked, alone);
+        let shown = shown.into_inner().unwrap();
+        for baked in &shown {
+            baked.validate().unwrap();
+            let ids = 0..baked.triangles.len() as u32;
+            let area: f64 = ids.map(|triangle| scene::area_vector(&baked.corners(triangle)).length()).sum();
+            assert!((area / scene.surface_area() - 1.0).abs() < 1e-6);
+            assert!(baked.mean_irradiance().min_element() > 0.5 * alone.mean_irradiance().min_element());
+        }
+        assert!(shown.len() > 2, "{} bakes were shown", shown.len());
+        assert!(shown.windows(2).all(|pair| pair[0].triangles.len() <= pair[1].triangles.len()));
+        assert_eq!(shown.last(), Some(&alone));
+        let nothing = solve(&Scene::default(), &SolveOptions::default(), &|_| ());
+        assert!(crate::flat_bake(&Scene::default(), &nothing).triangles.is_empty());
     }
 
     #[test]

@@ -28,6 +28,7 @@ mod residual;
 mod rounds;
 mod samples;
 mod small_patch;
+mod snapshot;
 mod stand_ins;
 #[cfg(test)]
 mod testing;
@@ -40,4 +41,5 @@ pub use edge_table::{EdgeTable, Leaf, LeafSegment, edge_table};
 pub use leaf_mesh::{Mesh, MeshStatistics, MeshTriangle, leaf_meshes};
 pub use ranking::{RankedLine, rank};
 pub use samples::{Progress, SampleQuery, SampleTable, sample_table};
+pub use snapshot::flat_bake;
 pub use weight::{Sweep, Weight};

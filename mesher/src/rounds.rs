@@ -2,7 +2,7 @@
 //! reflectors.
 
 use glam::{DVec2, Vec3};
-use scene::{Rgb, Scene};
+use scene::{Baked, Rgb, Scene};
 use solver::{Gather, NodeId, Solution, Visibility};
 
 use crate::BakeOptions;
@@ -52,6 +52,8 @@ pub(crate) struct Rounds<'a> {
     pub solution: Solution,
     pub lines: Lines,
     pub inquiry: Inquiry<'a>,
+    /// Who is shown every mesh, and all that is found out of its light.
+    pub watch: Option<&'a (dyn Fn(Baked) + Sync)>,
     pub emitted: EmittedLight,
     pub reflected: ReflectedLight,
     /// Mean irradiance of all surfaces, averaged over the colours, W·m⁻².
@@ -85,6 +87,7 @@ impl Rounds<'_> {
             if self.inquiry.stopped() {
                 break;
             }
+            self.show(&fine);
             if self.solution.visibility == Visibility::Rays {
                 let samples = self.reflected.irradiance(&self.solution, &fine);
                 self.take_means(&fine, &samples);
@@ -139,7 +142,7 @@ impl Rounds<'_> {
         if !self.solution.reflects() {
             return fine.shown.clone();
         }
-        if self.inquiry.stopped() && !self.reflected.is_known() {
+        if !self.reflected.is_known() {
             let guess = |query| guessed_reflected(&self.solution, query, self.reflectance);
             return fine.table.queries.iter().zip(&fine.shown).map(|(query, light)| light + guess(query)).collect();
         }
@@ -193,6 +196,7 @@ impl Rounds<'_> {
                 leaves[leaf].1 += part * (error / own.max(self.mean)).powi(2);
             }
             leaves.iter_mut().for_each(|leaf| leaf.1 = leaf.1.sqrt());
+            self.show(&fine);
             let (divided, _) = self.wanting(&leaves);
             if divided.is_empty() || fine.triangles() > self.options.max_triangles {
                 break;

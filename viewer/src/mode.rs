@@ -25,11 +25,13 @@ pub enum Mode {
     Discontinuities,
     /// Luminance on a logarithmic ramp of ten stops around middle grey: black, purple, red, orange, yellow.
     FalseColor,
+    /// Gouraud in the left half, the quadratic interpolants in the right one (the paper's figures 7 and 8 in one).
+    Split,
 }
 
 impl Mode {
     /// All modes. The shader `interpolant_pass.wgsl` numbers them in this order.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 9] = [
         Self::Shaded,
         Self::Gouraud,
         Self::Ids,
@@ -38,6 +40,7 @@ impl Mode {
         Self::Mesh,
         Self::Discontinuities,
         Self::FalseColor,
+        Self::Split,
     ];
 
     /// The name on the command line.
@@ -51,13 +54,14 @@ impl Mode {
             Self::Mesh => "mesh",
             Self::Discontinuities => "discontinuities",
             Self::FalseColor => "false-color",
+            Self::Split => "split",
         }
     }
 
     /// Whether the picture is light alone, which the tone map exposes. The others are diagrams: the interpolant pass
     /// has exposed what light they show and drawn over it, so their colours go to the display as they are.
     pub fn is_light(self) -> bool {
-        matches!(self, Self::Shaded | Self::Gouraud)
+        matches!(self, Self::Shaded | Self::Gouraud | Self::Split)
     }
 
     /// The next mode in the order of [`Mode::ALL`], around the end.
@@ -75,7 +79,7 @@ impl fmt::Display for Mode {
 /// A name that no mode has.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "no mode is called “{0}”: use shaded, gouraud, ids, barycentrics, elements, mesh, discontinuities or false-color"
+    "no mode is called “{0}”: use shaded, gouraud, ids, barycentrics, elements, mesh, discontinuities, false-color or split"
 )]
 pub struct UnknownMode(String);
 
@@ -106,7 +110,7 @@ mod tests {
     fn modes_are_numbered_in_order_and_next_goes_round() {
         for (number, mode) in Mode::ALL.into_iter().enumerate() {
             assert_eq!(mode as usize, number);
-            assert_eq!(mode.next(), Mode::ALL[(number + 1) % 8]);
+            assert_eq!(mode.next(), Mode::ALL[(number + 1) % Mode::ALL.len()]);
         }
     }
 }

@@ -3,7 +3,10 @@
 use bytemuck::{Pod, Zeroable};
 use scene::{Baked, EdgeKind, Interpolant, LineKind, Rgb};
 
-use crate::texture_records::{TexturePlace, texture_words};
+use crate::{
+    id_mesh::IdMesh,
+    texture_records::{TexturePlace, texture_words},
+};
 
 /// One triangle as pass (c) reads it. The coefficients (A, 2B, 2C, D, 2E, F) of its interpolant are multiplied by ρ/π, so
 /// that the quadratic is reflected radiance at once and no material is looked up at a pixel; the clamp at 0
@@ -40,8 +43,10 @@ pub(crate) type Corners = [[f32; 3]; 3];
 pub(crate) struct Records {
     /// Pass (c)'s triangles.
     pub triangles: Vec<TriangleRecord>,
-    /// Passes (a) and (b)'s triangles; the edge overlays of pass (c) read them, too.
+    /// Corners of pass (c)'s triangles.
     pub corners: Vec<Corners>,
+    /// Passes (a) and (b)'s triangles.
+    pub mesh: IdMesh,
     /// Radiance of each leaf element by the solver's constant irradiance, W·sr⁻¹·m⁻²; the fourth number is padding.
     pub elements: Vec<[f32; 4]>,
     /// Textures, as [`texture_words`] has them; empty where there are none.
@@ -91,6 +96,7 @@ impl Records {
         Self {
             triangles: ids.clone().map(triangle).collect(),
             corners: ids.map(|id| baked.corners(id).map(|corner| corner.as_vec3().to_array())).collect(),
+            mesh: IdMesh::of(baked),
             elements: baked.elements.iter().map(element).collect(),
             textures,
         }

@@ -42,6 +42,7 @@ const ELEMENTS = 4u;
 const MESH = 5u;
 const DISCONTINUITIES = 6u;
 const FALSE_COLOR = 7u;
+const SPLIT = 8u;
 
 @compute @workgroup_size(8, 8)
 fn interpolate(@builtin(global_invocation_id) id: vec3<u32>) {
@@ -49,17 +50,36 @@ fn interpolate(@builtin(global_invocation_id) id: vec3<u32>) {
     if any(vec2<f32>(pixel) >= frame.size) {
         return;
     }
-    let seen = textureLoad(visibility, pixel, 0).xy;
+    let seen = textureLoad(visibility, pixel, 0).x;
     var colour = vec3(0.0);
     // Back sides are black.
-    if seen.x != 0u && seen.x < 0x80000000u {
-        colour = colour_at(seen.x - 1u, unpack2x16unorm(seen.y), vec2<f32>(pixel) + 0.5);
+    if seen != 0u && seen < 0x80000000u {
+        let place = vec2<f32>(pixel) + 0.5;
+        colour = colour_at(seen - 1u, barycentrics(seen - 1u, place), place);
     }
-    textureStore(picture, pixel, vec4(colour, f32(seen.x != 0u)));
+    textureStore(picture, pixel, vec4(colour, f32(seen != 0u)));
+}
+
+// Where on a triangle that faces the eye the ray through a pixel meets it (Moeller and Trumbore 1997).
+fn barycentrics(id: u32, pixel: vec2<f32>) -> vec2<f32> {
+    let a = position(3u * id);
+    let ab = position(3u * id + 1u) - a;
+    let ac = position(3u * id + 2u) - a;
+    let eye = frame.eye - a;
+    let x = pixel.x - 0.5 * frame.size.x;
+    let y = 0.5 * frame.size.y - pixel.y;
+    let ray = frame.right * x + frame.up * y + frame.forward * frame.focal;
+    let st = vec2(dot(cross(ac, eye), ray), dot(cross(eye, ab), ray)) / max(dot(cross(ac, ab), ray), 1e-30);
+    return clamp(st, vec2(0.0), vec2(1.0));
+}
+
+// A corner of a triangle, metres.
+fn position(index: u32) -> vec3<f32> {
+    return vec3(corners[3u * index], corners[3u * index + 1u], corners[3u * index + 2u]);
 }
 
 fn colour_at(id: u32, st: vec2<f32>, pixel: vec2<f32>) -> vec3<f32> {
-    if MODE == GOURAUD {
+    if MODE == GOURAUD || MODE == SPLIT && pixel.x < 0.5 * frame.size.x {
         return gouraud(id, st.x, st.y);
     } else if MODE == IDS {
         return id_colour(id);
@@ -203,6 +223,6 @@ fn line_distance(from_corner: vec3<f32>, to_corner: vec3<f32>, place: vec3<f32>)
 
 // A corner of a triangle in the camera's axes, metres.
 fn corner(index: u32) -> vec3<f32> {
-    let p = vec3(corners[3u * index], corners[3u * index + 1u], corners[3u * index + 2u]) - frame.eye;
+    let p = position(index) - frame.eye;
     return vec3(dot(p, frame.right), dot(p, frame.up), dot(p, frame.forward));
 }
