@@ -32,7 +32,7 @@ pub use interpolant::{Interpolant, SAMPLE_BARYCENTRICS};
 pub use material::Material;
 pub use polygon::{Plane, Polygon, area_vector, centroid, is_convex};
 pub use ray::{Ray, ShearedRay};
-pub use rgb::{Rgb, luminance};
+pub use rgb::{LUMINOUS_EFFICACY, Rgb, luminance};
 pub use scene::{LARGEST_COORDINATE, Scene, SceneError, other_sides};
 pub use texture::Texture;
 pub use texture_map::TextureMap;

@@ -38,8 +38,17 @@ const ADAPTED: f32 = 0.01;
 const PIXELS_PER_NOTCH: f64 = 40.0;
 
 /// Keys of the modes, in the order of [`Mode::ALL`].
-const MODE_KEYS: [KeyCode; Mode::ALL.len()] =
-    [KeyCode::F1, KeyCode::F2, KeyCode::F3, KeyCode::F4, KeyCode::F5, KeyCode::F6, KeyCode::F7, KeyCode::F8];
+const MODE_KEYS: [KeyCode; Mode::ALL.len()] = [
+    KeyCode::F1,
+    KeyCode::F2,
+    KeyCode::F3,
+    KeyCode::F4,
+    KeyCode::F5,
+    KeyCode::F6,
+    KeyCode::F7,
+    KeyCode::F8,
+    KeyCode::F9,
+];
 
 /// Keys of the scene's stored cameras, in order.
 const CAMERA_KEYS: [KeyCode; 9] = [
@@ -58,7 +67,7 @@ const CAMERA_KEYS: [KeyCode; 9] = [
 /// window systems have it, once in a process.
 ///
 /// W, A, S, D move, E and Q rise and sink, Shift hurries and Ctrl tarries; the mouse looks around while a button is held,
-/// its wheel sets the speed. 1–9 go to the scene's cameras, F1–F8 choose the mode and M the next one; Esc closes.
+/// its wheel sets the speed. 1–9 go to the scene's cameras, F1–F9 choose the mode and M the next one; Esc closes.
 /// Without an exposure the view is metered, and adapts as an eye does.
 ///
 /// # Errors
@@ -131,10 +140,11 @@ impl Walk<'_> {
         let seconds = self.last_step.map_or(0.0, |last| (now - last).as_secs_f64().min(LONGEST_STEP));
         self.flight = self.flight.step(&self.hands.take_steering(), seconds);
         let (width, height) = (targets.width, targets.height);
-        let metered = self.exposure.unwrap_or_else(|| self.twin.meter(&self.flight.camera, width, height));
+        let frame = Frame { camera: self.flight.camera, width, height, mode: self.mode, exposure: None };
+        let metered = self.exposure.unwrap_or_else(|| self.twin.meter(&frame));
         let exposure = adapt(self.adapted.unwrap_or(metered), metered, seconds);
         self.adapted = Some(exposure);
-        let frame = Frame { camera: self.flight.camera, width, height, mode: self.mode, exposure: Some(exposure) };
+        let frame = Frame { exposure: Some(exposure), ..frame };
         let drawn = stage.present(&frame, exposure)?;
         let moving = self.hands.is_moving() || exposure != metered || !drawn;
         self.last_step = moving.then_some(now);
