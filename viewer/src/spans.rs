@@ -89,8 +89,7 @@ impl<'a> Spans<'a> {
         for (i, shown) in shown.iter_mut().enumerate() {
             let [s, t] = span.at(i as f32);
             let colour = self.colour(Seen { id: triangle + 1, s, t }, [x + i, y]) * scale;
-            let [r, g, b] = colour.to_array().map(|channel| table.shown(channel));
-            *shown = [r, g, b, 255];
+            *shown = [table.shown(colour.x), table.shown(colour.y), table.shown(colour.z), 255];
         }
     }
 

@@ -146,7 +146,8 @@ fn texture_corner(word: u32) -> vec2<f32> {
 
 // A texel in linear light; columns and rows from -1 to the size repeat.
 fn texel(texels: u32, size: vec2<i32>, place: vec2<i32>) -> vec3<f32> {
-    let inside = (place + size) % size;
+    let above = select(place, place - size, place >= size);
+    let inside = select(above, above + size, above < vec2(0));
     let colour = textures[texels + u32(inside.y * size.x + inside.x)];
     let values = vec3(textures[colour & 255u], textures[(colour >> 8u) & 255u], textures[(colour >> 16u) & 255u]);
     return bitcast<vec3<f32>>(values);
