@@ -182,7 +182,7 @@ pub struct ShotFlags {
     /// Largest difference from the reference that is accepted; exit code 3 above it
     #[arg(long, value_name = "E", value_parser = non_negative, requires = "compare", allow_hyphen_values = true)]
     pub max_error: Option<f64>,
-    /// A camera's path, a TOML file of [[camera]] entries with eye and target in metres, and, if needed, time in seconds, up
+    /// A camera's path, a TOML file of `[[camera]]` entries with eye and target in metres, and, if needed, time in seconds, up
     /// and fov: pictures are taken along it, evenly in time
     #[arg(long, value_name = "PATH.toml", requires = "frames", conflicts_with_all = ["camera", "eye", "compare"])]
     pub path: Option<PathBuf>,

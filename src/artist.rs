@@ -1,7 +1,7 @@
 //! What draws pictures: a graphics adapter, or the CPU.
 
 use anyhow::{Context, Result};
-use scene::{Baked, Camera, Exposure};
+use scene::{Baked, Exposure};
 use viewer::{Capture, Frame, FrameTimes, Gpu, Picture, Twin, ViewerError};
 
 use crate::args::Backend;
@@ -33,10 +33,10 @@ impl<'a> Studio<'a> {
         Ok(Self { baked, backend, twin, gpu: unless_needed(backend, gpu)?.flatten() })
     }
 
-    /// The exposure that cameras ask for together: the mean of what each does.
-    pub fn meter(&self, cameras: &[Camera], (width, height): (u32, u32)) -> Exposure {
-        let sum: f32 = cameras.iter().map(|camera| self.twin.meter(camera, width, height).ev).sum();
-        Exposure { ev: sum / cameras.len().max(1) as f32 }
+    /// The exposure that frames ask for together: the mean of what each does.
+    pub fn meter(&self, frames: &[Frame]) -> Exposure {
+        let sum: f32 = frames.iter().map(|frame| self.twin.meter(frame).ev).sum();
+        Exposure { ev: sum / frames.len().max(1) as f32 }
     }
 
     /// What draws pictures of a size.

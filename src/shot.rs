@@ -8,7 +8,7 @@ use formats::FormatError;
 use glam::Vec3;
 use scene::{Camera, CameraPath, Scene};
 use serde::Serialize;
-use viewer::{Frame, Picture};
+use viewer::{Frame, Mode, Picture};
 
 use crate::args::{ExposureChoice, ImageKind, ShotFlags, Viewpoint};
 use crate::artist::{Artist, Studio};
@@ -44,14 +44,15 @@ pub fn run(flags: &ShotFlags, outputs: &Outputs) -> Result<Outcome> {
     let read = begin.elapsed();
 
     let studio = Studio::open(&baked, flags.backend)?;
+    let (mode, curve) = (flags.mode, flags.tone_curve);
+    let frame = |&camera: &Camera| Frame { camera, width, height, mode, exposure: None, curve };
+    let mut frames: Vec<Frame> = cameras.iter().map(frame).collect();
     let exposure = match flags.exposure {
-        ExposureChoice::Auto => studio.meter(&cameras, flags.size),
+        ExposureChoice::Auto => studio.meter(&frames),
         ExposureChoice::Fixed(exposure) => exposure,
     };
+    frames.iter_mut().for_each(|frame| frame.exposure = Some(exposure));
     let mut artist = studio.artist(flags.size)?;
-    let (mode, curve) = (flags.mode, flags.tone_curve);
-    let frame = |&camera: &Camera| Frame { camera, width, height, mode, exposure: Some(exposure), curve };
-    let frames: Vec<Frame> = cameras.iter().map(frame).collect();
     if flags.timing {
         let start = Start { begin, read, ready: begin.elapsed() };
         let timing = frame_timing::measure(&mut artist, &frames, flags.frames(), baked.triangles.len(), start)?;
@@ -77,7 +78,10 @@ fn draw(
     let mut error = None;
     for (i, (frame, file)) in frames.iter().zip(files).enumerate() {
         stage.advance(i as f64 / files.len() as f64);
-        let picture = artist.draw(frame, radiance)?;
+        let mut picture = artist.draw(frame, radiance)?;
+        if flags.mode == Mode::FalseColor {
+            picture.add_legend();
+        }
         write(&picture, file)?;
         background += picture.background;
         error = reference.as_ref().map(|reference| reference.error(&picture));

@@ -9,7 +9,7 @@ use std::thread::JoinHandle;
 use anyhow::{Context, Result};
 use rayon::ThreadPoolBuilder;
 use scene::{Baked, Scene};
-use viewer::{Frame, PictureKind, Update, Walkthrough, WindowSystem};
+use viewer::{Frame, Mode, PictureKind, Update, Walkthrough, WindowSystem};
 
 use crate::args::{Backend, LightFlags, SceneFlags, ViewFlags, Viewpoint};
 use crate::artist::Studio;
@@ -163,7 +163,10 @@ fn save(baked: &Baked, frame: &Frame, kind: PictureKind, input: &Path, outputs: 
     let path = names.into_iter().find(|path| !path.exists()).context("every name is taken")?;
     let output = outputs.claim(&path)?;
     let studio = Studio::open(baked, Backend::Auto)?;
-    let picture = studio.artist((frame.width, frame.height))?.draw(frame, kind == PictureKind::Exr)?;
+    let mut picture = studio.artist((frame.width, frame.height))?.draw(frame, kind == PictureKind::Exr)?;
+    if frame.mode == Mode::FalseColor {
+        picture.add_legend();
+    }
     shot::write(&picture, &output)?;
     Ok(format!("{} is written, EV {:.3}", path.display(), picture.exposure.ev))
 }

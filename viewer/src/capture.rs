@@ -103,7 +103,7 @@ impl<'a> Capture<'a> {
             return Err(ViewerError::InvalidCamera);
         }
         let frame = Frame { width: self.targets.width, height: self.targets.height, ..*frame };
-        Ok((frame, frame.exposure.unwrap_or_else(|| self.twin.meter(&frame.camera, frame.width, frame.height))))
+        Ok((frame, frame.exposure.unwrap_or_else(|| self.twin.meter(&frame))))
     }
 
     fn picture(&self, shown: Rows<'_>, exposure: Exposure) -> Picture {

@@ -2,7 +2,6 @@
 
 use std::num::NonZeroU32;
 use std::sync::Arc;
-use std::time::Instant;
 
 use winit::{
     dpi::PhysicalSize,
@@ -31,6 +30,8 @@ pub(crate) struct CpuScreen {
     last: Option<(Frame, u32, Picture)>,
     /// Seconds that a pixel of a picture takes, as the last one did.
     seconds_by_pixel: f64,
+    /// Milliseconds of its passes.
+    pub parts: Vec<(&'static str, f64)>,
 }
 
 impl CpuScreen {
@@ -48,6 +49,7 @@ impl CpuScreen {
             overlay: OverlayTwin::default(),
             last: None,
             seconds_by_pixel: 1e-6,
+            parts: Vec::new(),
         };
         screen.resize(size)?;
         Ok(screen)
@@ -83,9 +85,9 @@ impl CpuScreen {
             coarseness = self.coarseness(frame, still);
             if self.last.as_ref().is_none_or(|(asked, coarse, _)| (asked, *coarse) != (frame, coarseness)) {
                 let coarse = Frame { width: width.div_ceil(coarseness), height: height.div_ceil(coarseness), ..*frame };
-                let start = Instant::now();
-                let picture = shown.twin.draw(&coarse);
-                self.seconds_by_pixel = start.elapsed().as_secs_f64() / coarse.pixels().max(1) as f64;
+                let (picture, took) = shown.twin.draw_timed(&coarse);
+                self.seconds_by_pixel = 1e-3 * took.frame_ms / coarse.pixels().max(1) as f64;
+                self.parts = took.parts_ms;
                 self.last = Some((*frame, coarseness, picture));
             }
             if let Some((.., picture)) = &self.last {

@@ -11,6 +11,7 @@ use crate::{
     interpolant_pass::InterpolantPass,
     mesh_pass::DEPTH_FORMAT,
     timestamps::Timestamps,
+    timing::FrameTimes,
     visibility_pass,
 };
 
@@ -181,11 +182,12 @@ pub(crate) fn texture(
 
 /// Draws a frame whose camera is valid: what is seen, how bright it is, and what a display makes of it.
 ///
-/// Where the host evaluates, what is seen has been drawn and evaluated when this returns; the encoder then brings it to
-/// the output.
+/// Where the host evaluates, what is seen has been drawn and evaluated when this returns, with what it took; the encoder then
+/// brings it to the output. An adapter tells `times` later.
 ///
 /// # Errors
 /// [`ViewerError::Driver`] where the host waits for a driver that fails.
+#[expect(clippy::too_many_arguments, reason = "what a frame depends on, and what it is drawn with")]
 pub(crate) fn encode_frame(
     gpu: &Gpu,
     encoder: &mut wgpu::CommandEncoder,
@@ -194,14 +196,22 @@ pub(crate) fn encode_frame(
     frame: &Frame,
     exposure: Exposure,
     output: &wgpu::TextureView,
-) -> Result<(), ViewerError> {
-    if let Evaluation::Host(pass) = &targets.evaluation {
-        pass.evaluate(gpu, bake, targets, frame, exposure, None)?;
-        pass.encode(gpu, encoder, output);
-    } else {
-        encode_passes(gpu, encoder, bake, targets, frame, exposure, output, None);
+    times: Option<&Timestamps>,
+) -> Result<Option<FrameTimes>, ViewerError> {
+    match &targets.evaluation {
+        Evaluation::Host(pass) => {
+            let took = pass.evaluate(gpu, bake, targets, frame, exposure, times)?;
+            pass.encode(gpu, encoder, output);
+            Ok(Some(took))
+        }
+        Evaluation::Adapter { .. } => {
+            encode_passes(gpu, encoder, bake, targets, frame, exposure, output, times);
+            if let Some(times) = times {
+                times.resolve(encoder, PASSES.len() as u32);
+            }
+            Ok(None)
+        }
     }
-    Ok(())
 }
 
 /// Passes that [`encode_passes`] may tell the times of, in their order.

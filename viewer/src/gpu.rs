@@ -36,9 +36,9 @@ pub enum Evaluator {
 }
 
 impl Evaluator {
-    /// Who does it on an adapter of a type. One that is a CPU itself takes three to five times as long for it as the host
-    /// (`data/record/2026-11-25-frames.md`): its shaders read a triangle number by number for every pixel, the host once
-    /// for all neighbours.
+    /// Who does it on an adapter of a type. One that is a CPU itself takes five to nine times as long for it as the host, and
+    /// three times with the best shader that was found (`data/record/2026-11-25-frames.md`): it reads a triangle number by
+    /// number for every pixel, the host once for all neighbours.
     fn of(adapter: wgpu::DeviceType) -> Self {
         if adapter == wgpu::DeviceType::Cpu { Self::Host } else { Self::Adapter }
     }

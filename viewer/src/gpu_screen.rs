@@ -10,12 +10,13 @@ use winit::{
 
 use crate::{
     Frame, Gpu, ViewerError,
-    frame::{Targets, encode_frame},
+    frame::{PASSES, Targets, encode_frame},
     gpu::{ResidentBake, guarded, surface_format},
     loader::Event,
     overlay_pass::OverlayPass,
     painting::Painting,
     screen::Presented,
+    timestamps::Timestamps,
 };
 
 /// Times in a row that a surface may be made anew before its adapter is taken to have failed.
@@ -34,6 +35,9 @@ pub(crate) struct GpuScreen {
     bake: Option<ResidentBake>,
     /// None while the window has no pixels.
     targets: Option<Targets>,
+    timestamps: Option<Timestamps>,
+    /// Milliseconds of the passes, of the last frame that told them.
+    pub parts: Vec<(&'static str, f64)>,
     /// How often in a row the surface had to be made anew.
     anew: u32,
 }
@@ -71,10 +75,23 @@ impl GpuScreen {
             view_formats: vec![shown_format],
         };
         let overlay = guarded(&gpu.device, || OverlayPass::new(&gpu.device, shown_format))?;
+        let timestamps = Timestamps::new(&gpu, PASSES.len() as u32)?;
         let size = window.inner_size();
         let gpu = Arc::new(gpu);
-        let mut screen =
-            Self { window, instance, surface, configuration, gpu, serial, overlay, bake: None, targets: None, anew: 0 };
+        let mut screen = Self {
+            window,
+            instance,
+            surface,
+            configuration,
+            gpu,
+            serial,
+            overlay,
+            bake: None,
+            targets: None,
+            timestamps,
+            parts: Vec::new(),
+            anew: 0,
+        };
         screen.resize(size)?;
         Ok(screen)
     }
@@ -112,8 +129,13 @@ impl GpuScreen {
         self.configure().map(|()| Presented::Late)
     }
 
-    /// Draws a frame, and the panels over it.
-    pub fn present(&mut self, frame: Option<&Frame>, painting: Painting) -> Result<Presented, ViewerError> {
+    /// Draws a frame, and the panels over it. Where the adapter tells what its passes took, one that is `still` waits for it.
+    pub fn present(
+        &mut self,
+        frame: Option<&Frame>,
+        painting: Painting,
+        still: bool,
+    ) -> Result<Presented, ViewerError> {
         let gpu = self.gpu.clone();
         // That a device is lost is only said to who asks.
         let _ = gpu.device.poll(wgpu::PollType::Poll);
@@ -132,18 +154,20 @@ impl GpuScreen {
             wgpu::CurrentSurfaceTexture::Lost => return self.make_anew(true),
         };
         self.anew = 0;
-        guarded(&gpu.device, || -> Result<(), ViewerError> {
+        let timestamps = self.timestamps.as_ref().filter(|_| still);
+        let took = guarded(&gpu.device, || {
             let output = texture.texture.create_view(&wgpu::TextureViewDescriptor {
                 format: self.configuration.view_formats.first().copied(),
                 ..Default::default()
             });
             let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
             let exposed = frame.and_then(|frame| Some((frame, frame.exposure?)));
+            let mut took = None;
             let drawn = match (exposed, &self.bake) {
                 (Some((frame, exposure)), Some(bake)) => {
                     // The window may have another size already than the one that is told next.
                     let frame = Frame { width: targets.width, height: targets.height, ..*frame };
-                    encode_frame(&gpu, &mut encoder, bake, targets, &frame, exposure, &output)?;
+                    took = encode_frame(&gpu, &mut encoder, bake, targets, &frame, exposure, &output, timestamps)?;
                     true
                 }
                 _ => false,
@@ -152,8 +176,15 @@ impl GpuScreen {
             self.overlay.encode(&gpu, encoder, &painting, size, &output, !drawn);
             self.window.pre_present_notify();
             gpu.queue.present(texture);
-            Ok(())
+            Ok::<_, ViewerError>((drawn, took))
         })??;
+        match (took, timestamps) {
+            ((_, Some(took)), _) => self.parts = took.parts_ms,
+            ((true, None), Some(times)) => {
+                self.parts = PASSES.into_iter().zip(times.milliseconds(&gpu, PASSES.len())?).collect();
+            }
+            _ => {}
+        }
         if outdated {
             self.configure()?;
         }

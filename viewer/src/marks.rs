@@ -1,16 +1,19 @@
 //! What is drawn into the picture itself: the clicked point, lines to the sources of its light, and the halves of a split view.
 
-use egui::{Align2, Color32, FontId, LayerId, Pos2, Rect, Stroke, Ui, pos2, vec2};
+use egui::{Align2, Color32, FontId, LayerId, Painter, Pos2, Rect, Stroke, Ui, Vec2, pos2, vec2};
 use glam::DVec3;
-use scene::{Camera, luminance};
+use scene::{Camera, Exposure, luminance};
 
-use crate::{LightSource, Mode, walk::Walk};
+use crate::{FalseColorScale, LightSource, Mode, digits::Number, walk::Walk};
 
 /// Sources that lines are drawn to at most: the weaker ones only hide the picture.
 pub(crate) const SOURCES: usize = 12;
 
 /// Depth at which lines are cut off before the eye, metres.
 const NEAR: f64 = 1e-3;
+
+/// Size of the scale of false colours, points.
+const SCALE: Vec2 = vec2(130.0, 260.0);
 
 /// Draws a walk's marks under the panels.
 pub(crate) fn draw(ui: &Ui, walk: &Walk) {
@@ -26,6 +29,9 @@ pub(crate) fn draw(ui: &Ui, walk: &Walk) {
             painter.rect_filled(rect.expand2(vec2(5.0, 2.0)), 3.0, Color32::from_black_alpha(140));
             painter.galley(rect.min, galley, Color32::WHITE);
         }
+    }
+    if walk.mode == Mode::FalseColor && walk.shown.is_some() {
+        scale(&painter, screen, Exposure { ev: walk.exposure.ev });
     }
     let (Some(clicked), Some(flight)) = (&walk.clicked, &walk.flight) else { return };
     let view = View { camera: flight.camera, screen };
@@ -53,6 +59,33 @@ pub(crate) fn draw(ui: &Ui, walk: &Walk) {
     if let Some(place) = view.place(point) {
         painter.circle_stroke(place, 6.0, Stroke::new(3.0, Color32::from_black_alpha(160)));
         painter.circle_stroke(place, 6.0, Stroke::new(1.5, Color32::WHITE));
+    }
+}
+
+/// Draws what false colours mean into the lower right corner.
+fn scale(painter: &Painter, screen: Rect, exposure: Exposure) {
+    let ground = Rect::from_min_max(screen.max - SCALE - vec2(10.0, 10.0), screen.max - vec2(10.0, 10.0));
+    painter.rect_filled(ground, 4.0, Color32::from_black_alpha(170));
+    let ramp = Rect::from_center_size(ground.center() + vec2(0.0, 8.0), vec2(18.0, SCALE.y - 36.0));
+    let font = || FontId::proportional(11.0);
+    for (text, align, x) in [("lx", Align2::RIGHT_TOP, ramp.left()), ("W/m²", Align2::LEFT_TOP, ramp.right())] {
+        let gap = if x == ramp.left() { -6.0 } else { 6.0 };
+        painter.text(pos2(x + gap, ground.top() + 5.0), align, text, font(), Color32::WHITE);
+    }
+    let rows = ramp.height() as u32;
+    for row in 0..rows {
+        let [r, g, b] = FalseColorScale::colour(1.0 - (f64::from(row) + 0.5) / f64::from(rows));
+        let stroke = Stroke::new(1.0, Color32::from_rgb(r, g, b));
+        painter.hline(ramp.x_range(), ramp.top() + row as f32 + 0.5, stroke);
+    }
+    for line in FalseColorScale::new(exposure).isolines() {
+        let y = ramp.bottom() - line.place as f32 * ramp.height();
+        let text = |x, align, number| {
+            painter.text(pos2(x, y), align, format!("{:.3}", Number(number)), font(), Color32::WHITE)
+        };
+        painter.hline(ramp.left() - 4.0..=ramp.left(), y, Stroke::new(1.0, Color32::WHITE));
+        text(ramp.left() - 6.0, Align2::RIGHT_CENTER, line.lux);
+        text(ramp.right() + 6.0, Align2::LEFT_CENTER, line.irradiance);
     }
 }
 

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use egui::{Color32, CornerRadius, FontFamily, FontId, Order, Pos2, Stroke, TextStyle, ViewportId, Visuals};
 use winit::{event::WindowEvent, window::Window};
 
-use crate::{command::Command, marks, pace::Pace, painting::Painting, panels, walk::Walk};
+use crate::{command::Command, marks, pace::Pace, painting::Painting, panels, screen::Screen, walk::Walk};
 
 /// Opacity of panels, 0..=255: what is behind them still shows.
 const OPACITY: u8 = 215;
@@ -65,7 +65,7 @@ impl Overlay {
     }
 
     /// Lays the panels out over a walk; what their buttons ask for, whether they change by themselves, and how they look.
-    pub fn lay_out(&mut self, walk: &mut Walk, pace: &Pace, drawn_by: &str) -> (Vec<Command>, bool, Painting) {
+    pub fn lay_out(&mut self, walk: &mut Walk, pace: &Pace, screen: &Screen) -> (Vec<Command>, bool, Painting) {
         let mut input = self.state.take_egui_input(&self.window);
         // Tab is a key of the walk, and would else go from button to button.
         input.events.retain(|event| !matches!(event, egui::Event::Key { key: egui::Key::Tab, .. }));
@@ -73,7 +73,7 @@ impl Overlay {
         let mut output = self.context.run_ui(input, |ui| {
             if walk.panels {
                 marks::draw(ui, walk);
-                panels::lay_out(ui, walk, pace, drawn_by, &mut commands);
+                panels::lay_out(ui, walk, pace, screen, &mut commands);
             }
         });
         self.state.handle_platform_output(&self.window, std::mem::take(&mut output.platform_output));

@@ -11,6 +11,7 @@ use crate::{
     digits::{Number, colour, place},
     marks::{self, colour_of},
     pace::{PARTS, Pace},
+    screen::Screen,
     walk::{Clicked, Walk},
 };
 
@@ -26,11 +27,11 @@ const EVS: std::ops::RangeInclusive<f32> = -12.0..=12.0;
 const GREYS: std::ops::RangeInclusive<f64> = 0.02..=0.8;
 
 /// Lays out all panels; what their buttons ask for is added to `commands`.
-pub(crate) fn lay_out(ui: &mut Ui, walk: &mut Walk, pace: &Pace, drawn_by: &str, commands: &mut Vec<Command>) {
+pub(crate) fn lay_out(ui: &mut Ui, walk: &mut Walk, pace: &Pace, screen: &Screen, commands: &mut Vec<Command>) {
     panel("view", Align2::LEFT_TOP).show(ui.ctx(), |ui| {
         ui.set_width(LEFT);
         work(ui, walk);
-        speed(ui, walk, pace, drawn_by);
+        speed(ui, walk, pace, screen);
         ui.separator();
         mode(ui, walk);
         brightness(ui, walk, commands);
@@ -77,7 +78,7 @@ fn work(ui: &mut Ui, walk: &Walk) {
     }
 }
 
-fn speed(ui: &mut Ui, walk: &Walk, pace: &Pace, drawn_by: &str) {
+fn speed(ui: &mut Ui, walk: &Walk, pace: &Pace, screen: &Screen) {
     if let Some(shown) = &walk.shown {
         let baked = &shown.baked;
         ui.label(format!("{} triangles", grouped(baked.triangles.len())));
@@ -94,8 +95,12 @@ fn speed(ui: &mut Ui, walk: &Walk, pace: &Pace, drawn_by: &str) {
             PARTS.iter().zip(parts).map(|(name, part)| format!("{name} {:.1}", ms(part))).collect();
         ui.label(faint(parts.join("   ")));
     }
-    let name = drawn_by.split(" (").next().unwrap_or(drawn_by);
-    ui.label(faint(name)).on_hover_text(drawn_by);
+    for (name, part) in screen.parts() {
+        ui.label(faint(format!("{:.1} ms  {}", part, name.replace('_', " ").replace('+', ", "))));
+    }
+    let drawn_by = screen.name();
+    let name = drawn_by.split(" (").next().unwrap_or(&drawn_by);
+    ui.label(faint(name)).on_hover_text(drawn_by.as_str());
 }
 
 /// A number with spaces between its thousands.

@@ -72,6 +72,14 @@ impl Screen {
         self.gpu().map_or_else(|| "CPU".to_owned(), |gpu| gpu.adapter_name())
     }
 
+    /// Milliseconds of the passes of a frame, where they are told.
+    pub fn parts(&self) -> &[(&'static str, f64)] {
+        match self {
+            Self::Gpu(screen) => &screen.parts,
+            Self::Cpu(screen) => &screen.parts,
+        }
+    }
+
     /// Draws this bake from now on. It is brought into the adapter's memory here, unless it is there already.
     pub fn show(&mut self, shown: &Arc<Shown>, resident: Option<ResidentBake>) -> Result<(), ViewerError> {
         match self {
@@ -100,7 +108,7 @@ impl Screen {
         still: bool,
     ) -> Result<Presented, ViewerError> {
         match self {
-            Self::Gpu(screen) => screen.present(frame, painting),
+            Self::Gpu(screen) => screen.present(frame, painting, still),
             Self::Cpu(screen) => screen.present(frame, painting, still),
         }
     }

@@ -89,8 +89,7 @@ impl<'a> Spans<'a> {
         for (i, shown) in shown.iter_mut().enumerate() {
             let [s, t] = span.at(i as f32);
             let colour = self.colour(Seen { id: triangle + 1, s, t }, [x + i, y]) * scale;
-            let [r, g, b] = colour.to_array().map(|channel| table.shown(channel));
-            *shown = [r, g, b, 255];
+            *shown = [table.shown(colour.x), table.shown(colour.y), table.shown(colour.z), 255];
         }
     }
 
@@ -125,10 +124,10 @@ fn show_light(record: &TriangleRecord, span: Span, exposure: f32, table: &ToneTa
         let mut places = [[0; LANES]; 3];
         for (k, places) in places.iter_mut().enumerate() {
             let [a, b2, c2, d] = [record.a[k], record.b2[k], record.c2[k], record.d[k]];
-            let [e2, f, emitted] = [record.e2[k], record.f[k], record.emitted[k]];
+            let [e2, f, reflectance, emitted] = [record.e2[k], record.f[k], record.reflectance[k], record.emitted[k]];
             for (place, (s, t)) in places.iter_mut().zip(s.into_iter().zip(t)) {
-                let reflected = (a * s + b2 * t + c2) * s + (d * t + e2) * t + f;
-                *place = ToneTable::place((reflected.max(0.0) + emitted) * exposure);
+                let light = (a * s + b2 * t + c2) * s + (d * t + e2) * t + f;
+                *place = ToneTable::place((light.max(0.0) * reflectance + emitted) * exposure);
             }
         }
         for (lane, shown) in shown.iter_mut().enumerate() {

@@ -11,6 +11,7 @@ use scene::{Baked, Bvh, Camera, Exposure, encode_srgb, luminance};
 
 use crate::{
     Frame, Mode, Picture,
+    false_color::false_color,
     frame::{FrameUniform, NEAR},
     records::{Corners, Records, TriangleRecord},
     texture_records::texture_colour,
@@ -60,7 +61,7 @@ impl Twin {
 
     /// Draws a picture, and says what its passes took.
     pub fn draw_timed(&self, frame: &Frame) -> (Picture, FrameTimes) {
-        let exposure = frame.exposure.unwrap_or_else(|| self.meter(&frame.camera, frame.width, frame.height));
+        let exposure = frame.exposure.unwrap_or_else(|| self.meter(frame));
         let mut watch = Stopwatch::start();
         let mut seen = vec![Seen::default(); frame.pixels()];
         let mut radiance = vec![Vec3::ZERO; frame.pixels()];
@@ -87,7 +88,7 @@ impl Twin {
 
     /// The exposure of a view: metered on a grid over the surfaces that reflect light, because a lamp in the picture
     /// must not darken the room; on the lamps where nothing else is seen.
-    pub fn meter(&self, camera: &Camera, width: u32, height: u32) -> Exposure {
+    pub fn meter(&self, &Frame { camera, width, height, mode, .. }: &Frame) -> Exposure {
         if !camera.is_valid() || width == 0 || height == 0 {
             return Exposure { ev: 0.0 };
         }
@@ -96,12 +97,16 @@ impl Twin {
             .into_par_iter()
             .filter_map(|i| {
                 let place = Vec2::new(place(i % METER_GRID, width), place(i / METER_GRID, height));
-                let Seen { id, s, t } = self.visibility(camera, place, width, height);
+                let Seen { id, s, t } = self.visibility(&camera, place, width, height);
                 let front = id != 0 && id & BACK == 0;
                 front.then(|| {
                     let record = &self.records.triangles[(id - 1) as usize];
                     let emits = record.emitted.iter().any(|&channel| channel > 0.0);
-                    (emits, luminance(interpolant(record, self.records.texture(record, s, t), s, t).as_dvec3()))
+                    let radiance = match mode.is_of_white() {
+                        true => light(record, s, t),
+                        false => interpolant(record, self.records.texture(record, s, t), s, t),
+                    };
+                    (emits, luminance(radiance.as_dvec3()))
                 })
             })
             .collect();
@@ -151,25 +156,40 @@ impl Records {
             }
             Mode::Mesh => overlay(exposed(interpolant(record, texture, s, t))),
             Mode::Discontinuities => overlay(0.35 * exposed(interpolant(record, texture, s, t))),
-            Mode::FalseColor => false_color(interpolant(record, texture, s, t), frame.exposure),
+            Mode::FalseColor => false_color(frame, record, &self.corners[id as usize], [s, t], place),
+            Mode::Light => light(record, s, t) + Vec3::from(record.emitted),
             Mode::Split if place.x < 0.5 * frame.size[0] => gouraud(record, texture, s, t),
             Mode::Split => interpolant(record, texture, s, t),
         }
     }
 }
 
-/// The quadratic, clamped at 0, times the texture's colour, and what the surface emits, W·sr⁻¹·m⁻².
-pub(crate) fn interpolant(record: &TriangleRecord, texture: Vec3, s: f32, t: f32) -> Vec3 {
+/// The radiance of a white surface: the quadratic, clamped at 0, W·sr⁻¹·m⁻².
+pub(crate) fn light(record: &TriangleRecord, s: f32, t: f32) -> Vec3 {
     let [a, b2, c2, d, e2, f] = [record.a, record.b2, record.c2, record.d, record.e2, record.f].map(Vec3::from);
-    let reflected = (a * s + b2 * t + c2) * s + (d * t + e2) * t + f;
-    reflected.max(Vec3::ZERO) * texture + Vec3::from(record.emitted)
+    ((a * s + b2 * t + c2) * s + (d * t + e2) * t + f).max(Vec3::ZERO)
+}
+
+/// What the surface makes of the light, with the texture's colour, and what it emits, W·sr⁻¹·m⁻².
+pub(crate) fn interpolant(record: &TriangleRecord, texture: Vec3, s: f32, t: f32) -> Vec3 {
+    light(record, s, t) * Vec3::from(record.reflectance) * texture + Vec3::from(record.emitted)
 }
 
 /// Linear between the values at the corners: F, A + 2C + F and D + 2E + F.
 fn gouraud(record: &TriangleRecord, texture: Vec3, s: f32, t: f32) -> Vec3 {
     let [a, c2, d, e2, f] = [record.a, record.c2, record.d, record.e2, record.f].map(Vec3::from);
-    let reflected = (a + c2) * s + (d + e2) * t + f;
-    reflected.max(Vec3::ZERO) * texture + Vec3::from(record.emitted)
+    let light = ((a + c2) * s + (d + e2) * t + f).max(Vec3::ZERO);
+    light * Vec3::from(record.reflectance) * texture + Vec3::from(record.emitted)
+}
+
+/// Where the ray through a place in the picture meets the plane of a triangle that faces the eye (Möller and Trumbore 1997).
+pub(crate) fn barycentrics(frame: &FrameUniform, corners: &Corners, place: Vec2) -> [f32; 2] {
+    let [a, b, c] = corners.map(Vec3::from);
+    let (ab, ac, eye) = (b - a, c - a, Vec3::from(frame.eye) - a);
+    let [right, up, forward] = [frame.right, frame.up, frame.forward].map(Vec3::from);
+    let [width, height] = frame.size;
+    let ray = right * (place.x - 0.5 * width) + up * (0.5 * height - place.y) + forward * frame.focal;
+    [ac.cross(eye), eye.cross(ab)].map(|normal| normal.dot(ray) / ac.cross(ab).dot(ray).max(1e-30))
 }
 
 /// A colour that neighbouring ids do not share: the id hashed (Jarzynski and Olano 2020, "pcg").
@@ -179,28 +199,6 @@ fn id_colour(id: u32) -> Vec3 {
     let hash = (word >> 22) ^ word;
     let channel = |shift: u32| 0.04 + 0.96 * ((hash >> shift) & 255) as f32 / 255.0;
     Vec3::new(channel(0), channel(8), channel(16))
-}
-
-/// The colour map "inferno" of matplotlib at ten places, display-linear.
-const RAMP: [Vec3; 10] = [
-    Vec3::new(0.0000, 0.0000, 0.0012),
-    Vec3::new(0.0110, 0.0037, 0.0545),
-    Vec3::new(0.0704, 0.0037, 0.1470),
-    Vec3::new(0.1878, 0.0116, 0.1529),
-    Vec3::new(0.3763, 0.0252, 0.1170),
-    Vec3::new(0.6240, 0.0578, 0.0612),
-    Vec3::new(0.8469, 0.1413, 0.0185),
-    Vec3::new(0.9647, 0.3231, 0.0018),
-    Vec3::new(0.9301, 0.6308, 0.0452),
-    Vec3::new(0.9734, 1.0000, 0.3712),
-];
-
-/// Ten stops around middle grey on a ramp of even lightness.
-fn false_color(radiance: Vec3, exposure: f32) -> Vec3 {
-    let luminance = radiance.dot(Vec3::new(0.2126, 0.7152, 0.0722)) * exposure;
-    let place = ((luminance.max(1e-30) / 0.18).log2() / 10.0 + 0.5).clamp(0.0, 1.0) * 9.0;
-    let index = (place as usize).min(8);
-    RAMP[index].lerp(RAMP[index + 1], place - index as f32)
 }
 
 /// Draws the edges of the pixel's triangle over a colour, anti-aliased.
@@ -332,13 +330,13 @@ mod tests {
     #[test]
     fn a_lamp_in_view_does_not_darken_the_room() {
         let mut room = room();
-        let dim = Twin::new(&room).meter(&camera(), 96, 64);
+        let dim = Twin::new(&room).meter(&frame(Mode::Shaded));
         room.scene.materials[2].radiance *= 100.0;
-        assert_eq!(Twin::new(&room).meter(&camera(), 96, 64), dim);
+        assert_eq!(Twin::new(&room).meter(&frame(Mode::Shaded)), dim);
         // Nothing but the lamp in view: then it is metered itself.
         let up =
             Camera { eye: DVec3::new(2.05, 1.65, 2.6), target: DVec3::new(2.05, 1.65, 2.7), up: DVec3::X, ..camera() };
-        assert!(Twin::new(&room).meter(&up, 96, 64).ev < -8.0);
+        assert!(Twin::new(&room).meter(&Frame { camera: up, ..frame(Mode::Shaded) }).ev < -8.0);
     }
 
     /// Against the projection of the corners, which needs a division that the pass avoids.
@@ -359,15 +357,5 @@ mod tests {
         assert!((top - 4.0).abs() < 1e-3 && (left - 3.0).abs() < 1e-3, "{top} {left}");
         let normal = Vec2::new(45.0, 60.0).normalize();
         assert!((hypotenuse - (pixels[1] - Vec2::new(23.0, 14.0)).dot(normal)).abs() < 1e-3);
-    }
-
-    #[test]
-    fn false_color_climbs_with_luminance_through_ten_stops() {
-        assert_eq!(false_color(Vec3::ZERO, 1.0), RAMP[0]);
-        assert_eq!(false_color(Vec3::splat(0.18 * 64.0), 1.0), RAMP[9]);
-        let brightness: Vec<f32> = (-10..=10)
-            .map(|half| false_color(Vec3::splat(0.18 * (half as f32 / 2.0).exp2()), 1.0).element_sum())
-            .collect();
-        assert!(brightness.windows(2).all(|pair| pair[0] < pair[1]), "{brightness:?}");
     }
 }

@@ -180,19 +180,19 @@ impl Walk {
     }
 
     /// Moves, and meters for a picture of a size in pixels, `seconds` later; true while there is more to come by itself.
-    pub fn step(&mut self, steering: &Steering, seconds: f64, (width, height): (u32, u32)) -> bool {
-        let (Some(shown), Some(flight)) = (&self.shown, &mut self.flight) else { return false };
+    pub fn step(&mut self, steering: &Steering, seconds: f64, size: (u32, u32)) -> bool {
+        let (Some(shown), Some(flight)) = (self.shown.clone(), &mut self.flight) else { return false };
         *flight = flight.step(steering, seconds);
+        let is_still = flight.is_still();
         let mut adapts = false;
-        if self.exposure.metered {
-            let metered =
-                shown.twin.meter(&flight.camera, width, height).ev + (self.exposure.key / MIDDLE_GREY).log2() as f32;
+        if let (true, Some(frame)) = (self.exposure.metered, self.frame(size)) {
+            let metered = shown.twin.meter(&frame).ev + (self.exposure.key / MIDDLE_GREY).log2() as f32;
             let from = if self.adapted { self.exposure.ev } else { metered };
             self.exposure.ev = adapt(from, metered, seconds);
             self.adapted = true;
             adapts = self.exposure.ev != metered;
         }
-        !steering.is_idle() || !flight.is_still() || adapts
+        !steering.is_idle() || !is_still || adapts
     }
 
     /// The picture that is seen, of a size in pixels.

@@ -266,7 +266,7 @@ impl Session {
         let steering = self.walk.steered(self.hands.take_steering(), self.hands.drag());
         let moves = self.walk.step(&steering, seconds, size);
         clock.lap();
-        let (commands, changes, painting) = stage.overlay.lay_out(&mut self.walk, &self.pace, &stage.screen.name());
+        let (commands, changes, painting) = stage.overlay.lay_out(&mut self.walk, &self.pace, &stage.screen);
         clock.lap();
         let presented = stage.screen.present(self.walk.frame(size).as_ref(), painting, !moves)?;
         clock.lap();
