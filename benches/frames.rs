@@ -131,7 +131,14 @@ fn measure(
     (width, height): (u32, u32),
 ) -> [Vec<Measured>; 3] {
     let captures = gpus.each_ref().map(|(_, gpu)| Capture::new(gpu, baked, twin, width, height).unwrap());
-    let frame = Frame { camera: baked.scene.cameras[0].camera, width, height, mode: Mode::Shaded, exposure: None };
+    let frame = Frame {
+        camera: baked.scene.cameras[0].camera,
+        width,
+        height,
+        mode: Mode::Shaded,
+        exposure: None,
+        curve: scene::ToneCurve::default(),
+    };
     let frame = Frame { exposure: Some(twin.meter(&frame)), ..frame };
     let mut measured = [(); 3].map(|()| Vec::new());
     // The first round compiles shaders and fills caches.
