@@ -230,9 +230,9 @@ mod tests {
         assert_eq!(numbered(Path::new("a.exr"), 12345), Path::new("a.12345.exr"));
         let camera = |x| Camera { eye: DVec3::X * x, target: DVec3::X * x + DVec3::Y, up: DVec3::Z, vertical_fov: 1.0 };
         let path = CameraPath::new([2.0, 5.0].map(|time| CameraKey { time, camera: camera(time) }).to_vec()).unwrap();
-        assert_eq!(along(&path, 1), [camera(2.0)]);
-        let eyes: Vec<f64> = along(&path, 4).iter().map(|camera| camera.eye.x).collect();
-        assert!(eyes.iter().zip([2.0, 3.0, 4.0, 5.0]).all(|(a, b)| (a - b).abs() < 1e-12), "{eyes:?}");
+        let eyes = |count| along(&path, count).iter().map(|camera| camera.eye.x).collect::<Vec<f64>>();
+        assert_eq!(eyes(1), [2.0]);
+        assert!(eyes(4).iter().zip([2.0, 3.0, 4.0, 5.0]).all(|(a, b)| (a - b).abs() < 1e-12), "{:?}", eyes(4));
     }
 
     #[test]
