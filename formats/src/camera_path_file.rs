@@ -11,7 +11,6 @@
 //!
 //! A key that is not listed here is an error.
 
-use std::fs;
 use std::path::Path;
 
 use glam::DVec3;
@@ -20,6 +19,7 @@ use serde::{Deserialize, Serialize};
 use toml::Spanned;
 
 use crate::scene_file::DEFAULT_FOV;
+use crate::toml_text::TomlText;
 use crate::{FormatError, write_atomically};
 
 #[derive(Deserialize)]
@@ -60,18 +60,9 @@ fn default_fov() -> f64 {
 /// A file that cannot be read, or the line of a key that is not known, of a camera that is not valid, or of a time that is not after
 /// the one before.
 pub fn read_camera_path(path: &Path) -> Result<CameraPath, FormatError> {
-    let bytes = fs::read(path).map_err(|error| FormatError::read(path, error))?;
-    let text = String::from_utf8(bytes)
-        .map_err(|_| FormatError::content(path, "is no text in UTF-8", "give a path of cameras in TOML"))?;
-    let wrong = |place: usize, cause: String, cure: &'static str| {
-        let line = text.bytes().take(place).filter(|byte| *byte == b'\n').count() + 1;
-        FormatError::line(path, line, cause, cure)
-    };
-    let file: PathFile = toml::from_str(&text).map_err(|error| {
-        let place = error.span().map_or(0, |span| span.start);
-        let cause = error.message().trim().replace('\n', ", ");
-        wrong(place, cause, "give [[camera]] with eye, target and, if needed, time, up and fov")
-    })?;
+    let text = TomlText::read(path, "give a path of cameras in TOML")?;
+    let file: PathFile = text.parse("give [[camera]] with eye, target and, if needed, time, up and fov")?;
+    let wrong = |place, cause, cure| text.wrong(place, cause, cure);
     let place = |number: usize| file.camera.get(number).map_or(0, |entry| entry.span().start);
     let is_timed = file.camera.first().is_some_and(|entry| entry.get_ref().time.is_some());
     if let Some(number) = file.camera.iter().position(|entry| entry.get_ref().time.is_some() != is_timed) {
@@ -118,6 +109,8 @@ fn entry(key: &CameraKey) -> KeyEntry {
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
+    use std::fs;
+
     use super::*;
 
     fn read(text: &str) -> Result<CameraPath, String> {

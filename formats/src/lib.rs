@@ -28,6 +28,7 @@ mod repair;
 mod report;
 mod scene_file;
 mod texture_file;
+mod toml_text;
 mod unfinished;
 
 pub use atomic_file::write_atomically;
