@@ -7,7 +7,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use glam::{DVec2, DVec3};
 use scene::{Baked, Bvh, Rgb, Scene, centroid};
-use solver::{Contribution, ElementLight, Gather, NodeId, Solution, SolveOptions};
+use solver::{Contribution, ElementLight, Gather, NodeId, Solution, SolveOptions, colour_slope};
 use viewer::{LightSource, SurfacePoint};
 
 use crate::pipeline;
@@ -86,16 +86,8 @@ fn element_light(baked: &Baked, bvh: &Bvh, solution: &Solution, leaf: NodeId, re
     let count = points.len() as f64;
     let middle = points.iter().map(|point| point.0).sum::<DVec2>() / count;
     let mean = points.iter().map(|point| point.1).sum::<Rgb>() / count;
-    let (mut uu, mut uv, mut vv, mut by_u, mut by_v) = (0.0, 0.0, 0.0, Rgb::ZERO, Rgb::ZERO);
-    for (place, irradiance) in &points {
-        let (offset, rest) = (*place - middle, *irradiance - mean);
-        (uu, uv, vv) = (uu + offset.x * offset.x, uv + offset.x * offset.y, vv + offset.y * offset.y);
-        (by_u, by_v) = (by_u + rest * offset.x, by_v + rest * offset.y);
-    }
-    let determinant = uu * vv - uv * uv;
-    let slopes = (determinant > 1e-9 * (uu + vv).powi(2))
-        .then(|| [(by_u * vv - by_v * uv) / determinant, (by_v * uu - by_u * uv) / determinant]);
-    let [gradient_u, gradient_v] = slopes.unwrap_or_default();
+    let around = points.iter().map(|&(place, irradiance)| (place - middle, irradiance - mean, 1.0));
+    let (gradient_u, gradient_v) = colour_slope(around);
     let irradiance = mean - gradient_u * middle.x - gradient_v * middle.y;
     (count > 0.0).then_some(ElementLight { irradiance, gradient_u, gradient_v, deviation: 0.0 })
 }

@@ -42,6 +42,7 @@ pub use form_factor::{exchange, form_factor, form_factor_at, point_form_factor};
 pub use irradiance::{Contact, Cosine, Gather};
 pub use lattice::{Fan, hemisphere, spread};
 pub use leaf_gather::{LeafGather, SeenNode};
+pub use linear_fit::colour_slope;
 pub use shafts::Shafts;
 pub use solution::{
     BlockerLists, Convergence, Cut, ElementLight, Interaction, Link, LinkSource, Solution, SolveOptions, Visibility,
