@@ -7,7 +7,7 @@ use scene::{Baked, Exposure};
 
 use crate::{
     Frame, Gpu, Mode, Picture, ViewerError,
-    frame::{Evaluation, PASSES, Targets, encode_passes, texture},
+    frame::{Drawing, Evaluation, PASSES, Targets, encode_passes, texture},
     gouraud_mesh::GouraudMesh,
     gpu::{ResidentBake, bind_group, guarded},
     mesh_pass::Mesh,
@@ -67,7 +67,7 @@ impl<'a> Capture<'a> {
         let (frame, exposure) = self.exposed(frame)?;
         let (mut picture, _) = self.show(&frame, exposure, |rows| self.picture(rows, exposure))?;
         picture.radiance = match &self.targets.evaluation {
-            Evaluation::Host(pass) => pass.radiance(self.gpu, &self.bake, &self.targets, &frame, exposure)?,
+            Evaluation::Host(pass) => pass.radiance(&Drawing { times: None, ..self.drawing(&frame, exposure) })?,
             Evaluation::Adapter { picture, .. } => {
                 // The frame has left it there.
                 let radiance = ReadBack::new(self.gpu, picture)?;
@@ -106,6 +106,12 @@ impl<'a> Capture<'a> {
         Ok((frame, frame.exposure.unwrap_or_else(|| self.twin.meter(&frame))))
     }
 
+    /// A frame at this size, with its times.
+    fn drawing<'b>(&'b self, frame: &'b Frame, exposure: Exposure) -> Drawing<'b> {
+        let Self { gpu, bake, targets, timestamps, .. } = self;
+        Drawing { gpu, bake, targets, frame, exposure, times: timestamps.as_ref() }
+    }
+
     fn picture(&self, shown: Rows<'_>, exposure: Exposure) -> Picture {
         let shown: Vec<[u8; 4]> = shown.to_vec();
         Picture {
@@ -139,14 +145,14 @@ impl<'a> Capture<'a> {
         exposure: Exposure,
         take: impl FnOnce(Rows<'_>) -> T,
     ) -> Result<(T, FrameTimes), ViewerError> {
-        let times = self.timestamps.as_ref();
+        let drawing = self.drawing(frame, exposure);
         match &self.targets.evaluation {
             Evaluation::Host(pass) => {
-                let took = pass.evaluate(self.gpu, &self.bake, &self.targets, frame, exposure, times)?;
+                let took = pass.evaluate(&drawing)?;
                 Ok((take(Rows::of(&pass.pixels(), frame.width)), took))
             }
             Evaluation::Adapter { .. } => self.read_back(&PASSES, take, |encoder, output| {
-                encode_passes(self.gpu, encoder, &self.bake, &self.targets, frame, exposure, output, times);
+                encode_passes(&drawing, encoder, output);
             }),
         }
     }

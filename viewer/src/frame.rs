@@ -180,33 +180,39 @@ pub(crate) fn texture(
     })
 }
 
-/// Draws a frame whose camera is valid: what is seen, how bright it is, and what a display makes of it.
+/// A frame whose camera is valid, what it shows, and what it is drawn with.
+#[derive(Clone, Copy)]
+pub(crate) struct Drawing<'a> {
+    pub gpu: &'a Gpu,
+    pub bake: &'a ResidentBake,
+    pub targets: &'a Targets,
+    pub frame: &'a Frame,
+    pub exposure: Exposure,
+    /// Tells what the passes took, where somebody asks.
+    pub times: Option<&'a Timestamps>,
+}
+
+/// Draws a frame: what is seen, how bright it is, and what a display makes of it.
 ///
 /// Where the host evaluates, what is seen has been drawn and evaluated when this returns, with what it took; the encoder then
-/// brings it to the output. An adapter tells `times` later.
+/// brings it to the output. An adapter tells its times later.
 ///
 /// # Errors
 /// [`ViewerError::Driver`] where the host waits for a driver that fails.
-#[expect(clippy::too_many_arguments, reason = "what a frame depends on, and what it is drawn with")]
 pub(crate) fn encode_frame(
-    gpu: &Gpu,
+    drawing: &Drawing<'_>,
     encoder: &mut wgpu::CommandEncoder,
-    bake: &ResidentBake,
-    targets: &Targets,
-    frame: &Frame,
-    exposure: Exposure,
     output: &wgpu::TextureView,
-    times: Option<&Timestamps>,
 ) -> Result<Option<FrameTimes>, ViewerError> {
-    match &targets.evaluation {
+    match &drawing.targets.evaluation {
         Evaluation::Host(pass) => {
-            let took = pass.evaluate(gpu, bake, targets, frame, exposure, times)?;
-            pass.encode(gpu, encoder, output);
+            let took = pass.evaluate(drawing)?;
+            pass.encode(drawing.gpu, encoder, output);
             Ok(Some(took))
         }
         Evaluation::Adapter { .. } => {
-            encode_passes(gpu, encoder, bake, targets, frame, exposure, output, times);
-            if let Some(times) = times {
+            encode_passes(drawing, encoder, output);
+            if let Some(times) = drawing.times {
                 times.resolve(encoder, PASSES.len() as u32);
             }
             Ok(None)
@@ -218,18 +224,9 @@ pub(crate) fn encode_frame(
 pub(crate) const PASSES: [&str; 3] = ["visibility", "interpolant", "tone_map"];
 
 /// Draws a frame that the adapter evaluates.
-#[expect(clippy::too_many_arguments, reason = "what a frame depends on, and what it is drawn with")]
-pub(crate) fn encode_passes(
-    gpu: &Gpu,
-    encoder: &mut wgpu::CommandEncoder,
-    bake: &ResidentBake,
-    targets: &Targets,
-    frame: &Frame,
-    exposure: Exposure,
-    output: &wgpu::TextureView,
-    times: Option<&Timestamps>,
-) {
-    encode_visibility(gpu, encoder, bake, targets, frame, exposure, times);
+pub(crate) fn encode_passes(drawing: &Drawing<'_>, encoder: &mut wgpu::CommandEncoder, output: &wgpu::TextureView) {
+    encode_visibility(drawing, encoder);
+    let Drawing { gpu, bake, targets, frame, times, .. } = drawing;
     // A bake and the pictures that it is drawn on are for the same adapter, which has one evaluator.
     if let (
         ResidentLight::Adapter { inputs, is_textured },
@@ -248,15 +245,8 @@ pub(crate) fn encode_passes(
 }
 
 /// Passes (a) and (b), where somebody else does the rest.
-pub(crate) fn encode_visibility(
-    gpu: &Gpu,
-    encoder: &mut wgpu::CommandEncoder,
-    bake: &ResidentBake,
-    targets: &Targets,
-    frame: &Frame,
-    exposure: Exposure,
-    times: Option<&Timestamps>,
-) {
+pub(crate) fn encode_visibility(drawing: &Drawing<'_>, encoder: &mut wgpu::CommandEncoder) {
+    let &Drawing { gpu, bake, targets, frame, exposure, times } = drawing;
     targets.write_uniform(gpu, frame, exposure);
     gpu.passes.visibility().encode(
         encoder,

@@ -10,7 +10,7 @@ use winit::{
 
 use crate::{
     Frame, Gpu, ViewerError,
-    frame::{PASSES, Targets, encode_frame},
+    frame::{Drawing, PASSES, Targets, encode_frame},
     gpu::{ResidentBake, guarded, surface_format},
     loader::Event,
     overlay_pass::OverlayPass,
@@ -167,7 +167,8 @@ impl GpuScreen {
                 (Some((frame, exposure)), Some(bake)) => {
                     // The window may have another size already than the one that is told next.
                     let frame = Frame { width: targets.width, height: targets.height, ..*frame };
-                    took = encode_frame(&gpu, &mut encoder, bake, targets, &frame, exposure, &output, timestamps)?;
+                    let drawing = Drawing { gpu: &gpu, bake, targets, frame: &frame, exposure, times: timestamps };
+                    took = encode_frame(&drawing, &mut encoder, &output)?;
                     true
                 }
                 _ => false,

@@ -12,7 +12,7 @@ use scene::{Exposure, ToneCurve};
 
 use crate::{
     Frame, Gpu, ViewerError,
-    frame::{Targets, encode_visibility, texture},
+    frame::{Drawing, encode_visibility, texture},
     gpu::{ResidentBake, ResidentLight, guarded},
     read_back::{ReadBack, Rows},
     spans::Spans,
@@ -55,23 +55,16 @@ impl HostPass {
     }
 
     /// Draws what is seen, and evaluates it.
-    pub fn evaluate(
-        &self,
-        gpu: &Gpu,
-        bake: &ResidentBake,
-        targets: &Targets,
-        frame: &Frame,
-        exposure: Exposure,
-        times: Option<&Timestamps>,
-    ) -> Result<FrameTimes, ViewerError> {
+    pub fn evaluate(&self, drawing: &Drawing<'_>) -> Result<FrameTimes, ViewerError> {
+        let &Drawing { gpu, frame, times, .. } = drawing;
         let mut watch = Stopwatch::start();
         let mut pixels = self.pixels.borrow_mut();
         pixels.resize(frame.pixels(), self.background);
         let table = if frame.mode.is_light() { &self.of_light[frame.curve as usize] } else { &self.of_colour };
         let background = self.background;
-        let [seen, evaluated] = self.see(gpu, bake, targets, frame, exposure, times, |spans, ids| {
+        let [seen, evaluated] = self.see(drawing, |spans, ids| {
             let seen = watch.lap();
-            let rows = pixels.par_chunks_mut(targets.width as usize).enumerate().with_min_len(ROWS);
+            let rows = pixels.par_chunks_mut(frame.width as usize).enumerate().with_min_len(ROWS);
             rows.for_each(|(y, shown)| spans.show(y, ids.row(y), table, background, shown));
             [seen, watch.lap()]
         })?;
@@ -93,16 +86,9 @@ impl HostPass {
     }
 
     /// Draws what is seen, and finds the radiance or display-linear colour of every pixel.
-    pub fn radiance(
-        &self,
-        gpu: &Gpu,
-        bake: &ResidentBake,
-        targets: &Targets,
-        frame: &Frame,
-        exposure: Exposure,
-    ) -> Result<Vec<Vec3>, ViewerError> {
-        self.see(gpu, bake, targets, frame, exposure, None, |spans, ids| {
-            (0..frame.height as usize).into_par_iter().flat_map_iter(|y| spans.colours(y, ids.row(y))).collect()
+    pub fn radiance(&self, drawing: &Drawing<'_>) -> Result<Vec<Vec3>, ViewerError> {
+        self.see(drawing, |spans, ids| {
+            (0..drawing.frame.height as usize).into_par_iter().flat_map_iter(|y| spans.colours(y, ids.row(y))).collect()
         })
     }
 
@@ -120,23 +106,14 @@ impl HostPass {
     }
 
     /// Has the adapter draw which triangle is seen at every pixel, and the host look at it.
-    #[expect(clippy::too_many_arguments, reason = "what a frame depends on, and what looks at it")]
-    fn see<T>(
-        &self,
-        gpu: &Gpu,
-        bake: &ResidentBake,
-        targets: &Targets,
-        frame: &Frame,
-        exposure: Exposure,
-        times: Option<&Timestamps>,
-        look: impl FnOnce(&Spans<'_>, Rows<'_>) -> T,
-    ) -> Result<T, ViewerError> {
+    fn see<T>(&self, drawing: &Drawing<'_>, look: impl FnOnce(&Spans<'_>, Rows<'_>) -> T) -> Result<T, ViewerError> {
+        let &Drawing { gpu, bake, targets, frame, exposure, times } = drawing;
         let ResidentLight::Host(records) = &bake.light else {
             return Err(ViewerError::Driver("the bake is in the adapter's memory, not in the host's".into()));
         };
         guarded(&gpu.device, || {
             let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-            encode_visibility(gpu, &mut encoder, bake, targets, frame, exposure, times);
+            encode_visibility(drawing, &mut encoder);
             self.ids.copy(&mut encoder, &targets.visibility);
             if let Some(times) = times {
                 times.resolve(&mut encoder, 1);
