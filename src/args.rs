@@ -97,7 +97,7 @@ pub struct LightFlags {
     /// Interreflections followed; 0 is direct light only [default: to convergence]
     #[arg(long, value_name = "N", allow_negative_numbers = true)]
     pub bounces: Option<u32>,
-    /// Largest number of discontinuities that one leaf follows (the paper's k)
+    /// Largest number of discontinuities that one leaf follows (the paper's k); in scenes of more than 400 polygons at most 3
     #[arg(long, value_name = "K", allow_negative_numbers = true)]
     pub discontinuities: Option<u32>,
     /// How the strength of discontinuities is measured

@@ -122,8 +122,9 @@ pub fn resume(
 }
 
 /// What made a bake: the options as they were used, and the counts. No seconds: the same input gives the same bytes.
-fn provenance(solution: &Solution, options: &BakeOptions, report: &BakeReport, min_weight: f64) -> Provenance {
+fn provenance(solution: &Solution, options: &BakeOptions, report: &BakeReport, min_weight: Option<f64>) -> Provenance {
     let bounces = solution.bounces.map_or_else(|| "all".to_owned(), |bounces| bounces.to_string());
+    let min_weight = min_weight.map_or_else(|| "by leaf".to_owned(), |weight| weight.to_string());
     let option = |name: &str, value: String| (name.to_owned(), value);
     let count = |name: &str, value: usize| (name.to_owned(), value as f64);
     Provenance {
@@ -134,7 +135,7 @@ fn provenance(solution: &Solution, options: &BakeOptions, report: &BakeReport, m
             option(LINK_ERROR, solution.link_error.to_string()),
             option(DISCONTINUITIES, options.discontinuities.to_string()),
             option(WEIGHT, options.weight.name().to_owned()),
-            option(MIN_WEIGHT, min_weight.to_string()),
+            option(MIN_WEIGHT, min_weight),
         ],
         statistics: vec![
             count("elements", report.elements),

@@ -22,7 +22,7 @@ pub struct BakeOptions {
     /// Relative root mean square error of irradiance that is accepted, and a fifth of the error that is accepted at 99 % of
     /// the area; 0..1.
     pub tolerance: f64,
-    /// Discontinuities that a leaf follows at most (k of Hardt & Teller 1996, section 4.2).
+    /// Discontinuities that a leaf follows at most (k of Hardt & Teller 1996, section 4.2); without links no more than three.
     pub discontinuities: u32,
     /// How discontinuities are weighed.
     pub weight: Weight,
@@ -116,8 +116,8 @@ pub struct Bake {
 pub struct BakeStatistics {
     /// Rounds of meshing and measurement.
     pub rounds: u32,
-    /// The least weight that was used, in the weight's unit.
-    pub min_weight: f64,
+    /// The least weight that was used, in the weight's unit; none where every leaf has its own.
+    pub min_weight: Option<f64>,
     /// Discontinuities of at least the least weight that were found, on all polygons or in all leaves that were looked at.
     pub discontinuities_found: usize,
     /// Discontinuities that at least one leaf follows.
@@ -153,13 +153,14 @@ pub fn resume(
     answers: Answers,
 ) -> Bake {
     let relative = options.tolerance / BakeOptions::default().tolerance;
-    let min_weight = options.min_weight.unwrap_or_else(|| relative * options.weight.default_minimum(scene, &solution));
+    let has_links = solution.visibility == Visibility::Links;
+    let default_minimum = || relative * options.weight.default_minimum(scene, &solution);
+    let min_weight = options.min_weight.or_else(|| has_links.then(default_minimum));
     (control.progress)(0.0);
     let lines = Lines::of_links(scene, &solution, options.weight, min_weight);
     let reflectance = mean_reflectance(scene, &solution);
-    let by_rays = solution.visibility == Visibility::Rays;
     // Without links elements are as small as they need to be at first.
-    let front = if by_rays { 0.0 } else { FRONT_LENGTH * scene.size() };
+    let front = if has_links { FRONT_LENGTH * scene.size() } else { 0.0 };
     let mut rounds = Rounds {
         scene,
         options,
@@ -168,9 +169,9 @@ pub fn resume(
         emitted: EmittedLight::default(),
         reflected: ReflectedLight::new(&solution, front),
         mean: colour_mean(solution.mean_irradiance),
-        is_guessed: by_rays,
+        is_guessed: !has_links,
         lines,
-        share: if by_rays { FIRST_SHARE_BY_RAYS } else { FIRST_SHARE },
+        share: if has_links { FIRST_SHARE } else { FIRST_SHARE_BY_RAYS },
         source_share: FIRST_SOURCE_SHARE,
         reflectance,
         reflected_errors: Vec::new(),
@@ -331,6 +332,27 @@ mod tests {
         assert_eq!(shown.last(), Some(&alone));
         let nothing = solve(&Scene::default(), &SolveOptions::default(), &|_| ());
         assert!(crate::flat_bake(&Scene::default(), &nothing).triangles.is_empty());
+    }
+
+    /// Tiles far below, which see nothing, make it too many polygons to be linked. Every leaf has a least weight of its own.
+    #[test]
+    fn without_links_leaves_that_are_wanting_follow_discontinuities() {
+        let small = floor_lamp_and_plate();
+        let mut outlines: Vec<Vec<DVec3>> = small.polygon_ids().map(|polygon| small.outline(polygon)).collect();
+        // A lamp so small that its shadow's edge is narrower than the leaves.
+        outlines[1] = rectangle([0.0, 0.0, 2.0], 0.02, false);
+        outlines
+            .extend((0..400).map(|i| rectangle([f64::from(i % 20) * 0.2, f64::from(i / 20) * 0.2, -3.0], 0.05, false)));
+        let mut scene = scene_of(&outlines);
+        scene.materials = small.materials;
+        scene.polygons[1].material = 1;
+        let (with, statistics) = baked(&scene, &BakeOptions { tolerance: 0.02, ..BakeOptions::default() });
+        assert!(statistics.discontinuities_kept > 0 && statistics.min_weight.is_none(), "{statistics:?}");
+        assert!(with.lines.iter().all(|line| (line.receiver, line.source, line.blocker) == (0, 1, 2)));
+        let none = BakeOptions { tolerance: 0.02, discontinuities: 0, ..BakeOptions::default() };
+        let (without, statistics) = baked(&scene, &none);
+        assert_eq!(statistics.discontinuities_kept, 0);
+        assert!(with.error.p99 < without.error.p99, "{:?} {:?}", with.error, without.error);
     }
 
     #[test]

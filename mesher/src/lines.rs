@@ -29,10 +29,11 @@ pub(crate) struct Lines {
 }
 
 impl Lines {
-    /// The lines on every polygon that its links ask for.
-    pub fn of_links(scene: &Scene, solution: &Solution, weight: Weight, min_weight: f64) -> Self {
+    /// The lines on every polygon that its links ask for, from a least weight on: without one none are known yet.
+    pub fn of_links(scene: &Scene, solution: &Solution, weight: Weight, min_weight: Option<f64>) -> Self {
         let half_edges = HalfEdges::new(scene);
         let on = |receiver: u32| {
+            let Some(min_weight) = min_weight else { return Vec::new() };
             let interactions = solution.interactions(scene, receiver);
             discontinuities(scene, &half_edges, receiver, &interactions, weight, min_weight)
         };
@@ -45,6 +46,11 @@ impl Lines {
     /// All lines, in the order in which they were found.
     pub fn all(&self) -> &[Discontinuity] {
         &self.all
+    }
+
+    /// Bytes that they take.
+    pub fn bytes(&self) -> usize {
+        size_of_val(self.all.as_slice())
     }
 
     /// Indices of the lines that may cross an element of a polygon.
@@ -131,7 +137,7 @@ mod tests {
     fn without_links_nothing_is_known_until_leaves_look_for_it() {
         let scene = plate_over_floor();
         let solution = solve(&scene, &SolveOptions::default(), &|_| ());
-        let mut lines = Lines::of_links(&scene, &solution, Weight::Ratio, 0.0);
+        let mut lines = Lines::of_links(&scene, &solution, Weight::Ratio, Some(0.0));
         assert!(lines.all().is_empty());
         lines.search(&scene, (&solution, &Gather::new(&scene, &solution)), &mut [], Weight::Ratio, |_| 0.0);
         assert!(lines.all().is_empty());
@@ -151,7 +157,7 @@ mod tests {
         let ranked = |outline: &[DVec3], all: &[Discontinuity], candidates: Vec<u32>| {
             rank(&scene, outline, all, candidates, Weight::Ratio, usize::MAX)
         };
-        let mut lines = Lines::of_links(&scene, &solution, Weight::Ratio, 0.0);
+        let mut lines = Lines::of_links(&scene, &solution, Weight::Ratio, Some(0.0));
         let leaves = solution.leaves_of(0);
         let mut crossed = Vec::new();
         for &leaf in &leaves {

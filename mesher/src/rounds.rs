@@ -127,7 +127,7 @@ impl Rounds<'_> {
         let lines = (&self.lines, weight, discontinuities.min(most) as usize);
         let dim = DIM * self.options.tolerance;
         let fine = FineMesh::new(self.scene, &self.solution, lines, dim, &mut self.emitted, &mut self.inquiry);
-        self.inquiry.hold(held(&self.solution, &fine));
+        self.inquiry.hold(held(&self.solution, &fine) + self.lines.bytes());
         fine
     }
 
