@@ -8,15 +8,14 @@ use std::cell::{Ref, RefCell};
 
 use glam::Vec3;
 use rayon::prelude::*;
-use scene::{Exposure, ToneCurve};
+use scene::ToneCurve;
 
 use crate::{
-    Frame, Gpu, ViewerError,
+    Gpu, ViewerError,
     frame::{Drawing, encode_visibility, texture},
-    gpu::{ResidentBake, ResidentLight, guarded},
+    gpu::{ResidentLight, guarded},
     read_back::{ReadBack, Rows},
     spans::Spans,
-    timestamps::Timestamps,
     timing::{FrameTimes, Stopwatch},
     tone_table::ToneTable,
 };
