@@ -6,11 +6,9 @@
 
 mod common;
 
-use std::time::Instant;
-
 use scene::Baked;
 use serde_json::Value;
-use viewer::{Capture, Frame, Gpu, Mode, draw_on_cpu};
+use viewer::{Capture, Frame, FrameTimes, Gpu, Mode, Twin};
 
 /// Frames of which the median counts.
 const FRAMES: usize = 41;
@@ -61,20 +59,26 @@ fn main() {
     println!("| drawn by | picture | mode | milliseconds | frames/s (the paper: 2.3 at 640 × 480) |");
     println!("|---|---|---|---|---|");
     let gpu = Gpu::headless().ok();
+    let twin = Twin::new(&baked);
     for (width, height) in [(640, 480), (1920, 1080)] {
         for mode in [Mode::Shaded, Mode::Gouraud] {
-            let camera = baked.scene.cameras[0].camera;
-            let frame = Frame { camera, width, height, mode, exposure: None };
-            let exposure = draw_on_cpu(&baked, &frame).exposure;
-            let line = |name: &str, milliseconds: f64| {
+            let frame = Frame {
+                camera: baked.scene.cameras[0].camera,
+                width,
+                height,
+                mode,
+                exposure: None,
+                curve: scene::ToneCurve::default(),
+            };
+            let line = |name: &str, frames: Vec<FrameTimes>| {
+                let milliseconds = FrameTimes::medians(&frames).unwrap().frame_ms;
                 let rate = 1000.0 / milliseconds;
                 println!("| {name} | {width} × {height} | {} | {milliseconds:.1} | {rate:.1} |", mode.name());
             };
-            let frame = Frame { exposure: Some(exposure), ..frame };
-            line("CPU, its hierarchy built anew", median_of(|| drop(draw_on_cpu(&baked, &frame))));
+            line("CPU", (0..FRAMES).map(|_| twin.draw_timed(&frame).1).collect());
             if let Some(gpu) = &gpu {
-                let capture = Capture::new(gpu, &baked, width, height).unwrap();
-                line(&gpu.adapter_name(), median_of(|| drop(capture.draw(&camera, mode, exposure).unwrap())));
+                let capture = Capture::new(gpu, &baked, &twin, width, height).unwrap();
+                line(&gpu.adapter_name(), (0..FRAMES).map(|_| capture.time(&frame).unwrap()).collect());
             }
         }
     }
@@ -85,14 +89,4 @@ fn bake(options: &[&str]) -> (Value, Baked) {
     let output = common::scratch("paper.hlf");
     let report = common::bake("office", options, &output);
     (report, formats::read_baked(&output).unwrap())
-}
-
-/// Milliseconds.
-fn median_of(mut work: impl FnMut()) -> f64 {
-    let times = (0..FRAMES).map(|_| {
-        let start = Instant::now();
-        work();
-        start.elapsed().as_secs_f64() * 1000.0
-    });
-    common::median(times.collect())
 }

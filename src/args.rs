@@ -5,9 +5,9 @@ use std::path::PathBuf;
 use anyhow::{Result, bail};
 use bytesize::ByteSize;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
-use clap::{Args, Parser, Subcommand, ValueEnum};
+use clap::{ArgGroup, Args, Parser, Subcommand, ValueEnum};
 use glam::DVec3;
-use scene::{Camera, Exposure};
+use scene::{Camera, Exposure, ToneCurve};
 use serde::Serialize;
 use viewer::Mode;
 
@@ -103,7 +103,7 @@ pub struct LightFlags {
     /// Interreflections followed; 0 is direct light only [default: to convergence]
     #[arg(long, value_name = "N", allow_negative_numbers = true)]
     pub bounces: Option<u32>,
-    /// Largest number of discontinuities that one leaf follows (the paper's k)
+    /// Largest number of discontinuities that one leaf follows (the paper's k); in scenes of more than 400 polygons at most 3
     #[arg(long, value_name = "K", allow_negative_numbers = true)]
     pub discontinuities: Option<u32>,
     /// How the strength of discontinuities is measured
@@ -151,6 +151,7 @@ impl Default for LightFlags {
 
 /// `halflight shot`.
 #[derive(Debug, Args)]
+#[command(group = ArgGroup::new("many").args(["path", "timing"]).multiple(true))]
 pub struct ShotFlags {
     /// Bake to draw, or a scene, which is baked first
     #[arg(value_name = "SCENE|OUT.hlf")]
@@ -158,9 +159,10 @@ pub struct ShotFlags {
     /// How a scene is read
     #[command(flatten)]
     pub reading: SceneFlags,
-    /// Where the picture goes; the name ends in .png (as displayed) or .exr (radiance, W/(sr m²))
-    #[arg(short, long, value_name = "IMAGE", value_parser = image_path)]
-    pub output: PathBuf,
+    /// Where the picture goes; the name ends in .png (as displayed) or .exr (radiance, W/(sr m²)). Pictures along a path have
+    /// their number before the ending: a.0001.png
+    #[arg(short, long, value_name = "IMAGE", value_parser = image_path, required_unless_present = "timing")]
+    pub output: Option<PathBuf>,
     /// The point of view
     #[command(flatten)]
     pub camera: CameraFlags,
@@ -176,17 +178,43 @@ pub struct ShotFlags {
     /// Exposure value, by which radiance is multiplied as 2^EV, or auto
     #[arg(long, value_name = "EV|auto", default_value = "auto", value_parser = exposure, allow_hyphen_values = true)]
     pub exposure: ExposureChoice,
+    /// How exposed light is brought into what a display shows: straight with a shoulder, straight and clipped, or as film has it
+    #[arg(long, default_value = "shoulder", value_parser = tone_curve())]
+    pub tone_curve: ToneCurve,
     /// Picture to compare with: an EXR by the relative RMSE of radiance, a PNG by the share of pixels off by more
     /// than 1/255
-    #[arg(long, value_name = "REFERENCE", value_parser = image_path, requires = "max_error")]
+    #[arg(long, value_name = "REFERENCE", value_parser = image_path, requires_all = ["max_error", "output"])]
     pub compare: Option<PathBuf>,
     /// Largest difference from the reference that is accepted; exit code 3 above it
     #[arg(long, value_name = "E", value_parser = non_negative, requires = "compare", allow_hyphen_values = true)]
     pub max_error: Option<f64>,
+    /// A camera's path, a TOML file of `[[camera]]` entries with eye and target in metres, and, if needed, time in seconds, up
+    /// and fov: pictures are taken along it, evenly in time
+    #[arg(long, value_name = "PATH.toml", requires = "frames", conflicts_with_all = ["camera", "eye", "compare"])]
+    pub path: Option<PathBuf>,
+    /// Draw frames without writing them, and print how long they take, and what of them each pass takes: medians, milliseconds
+    #[arg(long)]
+    pub timing: bool,
+    /// Pictures along the path, or frames that are timed [default: 60]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=MOST_FRAMES), requires = "many", allow_negative_numbers = true)]
+    pub frames: Option<u32>,
     /// Print one JSON object on stdout
     #[arg(long)]
     pub json: bool,
 }
+
+impl ShotFlags {
+    /// Frames that are asked for where there may be many.
+    pub fn frames(&self) -> u32 {
+        self.frames.unwrap_or(FRAMES)
+    }
+}
+
+/// Frames that are timed if nothing is said: half a second to a few, without a GPU.
+const FRAMES: u32 = 60;
+
+/// Most frames: an hour of film.
+const MOST_FRAMES: i64 = 100_000;
 
 /// Where a picture is taken from: nothing (the scene's first camera, or one that sees the whole scene), a camera
 /// of the scene by name, or a free one.
@@ -471,6 +499,11 @@ fn png_path(text: &str) -> Result<PathBuf, String> {
 
 fn mode() -> impl TypedValueParser<Value = Mode> {
     PossibleValuesParser::new(Mode::ALL.map(Mode::name)).try_map(|text| text.parse::<Mode>())
+}
+
+fn tone_curve() -> impl TypedValueParser<Value = ToneCurve> {
+    let named = |text: String| ToneCurve::ALL.into_iter().find(|curve| curve.name() == text).ok_or("no such curve");
+    PossibleValuesParser::new(ToneCurve::ALL.map(ToneCurve::name)).try_map(named)
 }
 
 /// A kind of picture file, by the end of its name.

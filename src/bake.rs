@@ -29,7 +29,7 @@ pub fn run(flags: &BakeFlags, outputs: &Outputs, interrupt: &Interrupt) -> Resul
     let answers = resumed.map_or_else(|| Ok(Answers::default()), |resumed| resumed.answers_about(&scene, flags))?;
     let known = answers.count();
     let pipeline::Bake { baked, mut report, answers, .. } =
-        pipeline::resume(&scene, &flags.light, &flags.limits, answers, interrupt);
+        pipeline::resume(&scene, &flags.light, &flags.limits, answers, interrupt, None);
     let start = Instant::now();
     let interrupted = answers.is_some();
     match answers {

@@ -12,7 +12,7 @@ use crate::args::{LightFlags, SceneFlags};
 use crate::bake::missed;
 use crate::failure::Usage;
 use crate::output::Outputs;
-use crate::pipeline;
+use crate::pipeline::{self, Onlooker};
 use crate::progress::{Stage, say};
 
 /// A file that a command was given.
@@ -41,7 +41,7 @@ impl Input {
             Self::Baked(baked) => Ok(baked),
             Self::Scene(scene) => {
                 require_light(path, &scene)?;
-                Ok(bake_once(&scene, flags, outputs))
+                Ok(bake_once(&scene, flags, outputs, None))
             }
         }
     }
@@ -88,20 +88,21 @@ pub fn require_light(path: &Path, scene: &Scene) -> Result<()> {
     Ok(())
 }
 
-/// The scene's bake, from the cache where it is there. A cache that cannot be used costs time, nothing else.
-fn bake_once(scene: &Scene, flags: &LightFlags, outputs: &Outputs) -> Baked {
+/// The scene's bake, from the cache where it is there, else made before an onlooker. A cache that cannot be used costs time, nothing
+/// else.
+pub fn bake_once(scene: &Scene, flags: &LightFlags, outputs: &Outputs, onlooker: Option<Onlooker<'_>>) -> Baked {
     let place = match place(scene, flags) {
         Ok(place) => place,
         Err(error) => {
             say(format_args!("warning: the bake will not be kept: {error:#}"));
-            return baked_anew(scene, flags);
+            return baked_anew(scene, flags, onlooker);
         }
     };
     // A file that another version wrote, or a damaged one, is made anew.
     if let Ok(baked) = formats::read_baked(&place) {
         return baked;
     }
-    let baked = baked_anew(scene, flags);
+    let baked = baked_anew(scene, flags, onlooker);
     let kept = outputs.claim(&place).and_then(|output| Ok(output.write(|path| formats::write_baked(path, &baked))?));
     if let Err(error) = kept {
         say(format_args!("warning: the bake was not kept: {error:#}"));
@@ -109,8 +110,8 @@ fn bake_once(scene: &Scene, flags: &LightFlags, outputs: &Outputs) -> Baked {
     baked
 }
 
-fn baked_anew(scene: &Scene, flags: &LightFlags) -> Baked {
-    let baked = pipeline::bake(scene, flags).baked;
+fn baked_anew(scene: &Scene, flags: &LightFlags, onlooker: Option<Onlooker<'_>>) -> Baked {
+    let baked = pipeline::bake(scene, flags, onlooker).baked;
     if !baked.error.holds {
         say(format_args!("warning: {}", missed(&baked, flags.tolerance)));
     }

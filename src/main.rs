@@ -3,14 +3,17 @@
 //! Exit codes: 0 done, 1 failed, 2 wrong usage, 3 a comparison or verification did not hold, 130 interrupted.
 
 mod args;
+mod artist;
 mod bake;
 mod compare;
 mod error_picture;
 mod failure;
+mod frame_timing;
 mod ground_truth;
 mod info;
 mod input;
 mod interrupt;
+mod light_sources;
 mod memory;
 mod output;
 mod pipeline;
@@ -26,6 +29,7 @@ mod validate;
 mod verification;
 mod verify;
 mod view;
+mod watch;
 
 use std::process::ExitCode;
 

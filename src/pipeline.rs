@@ -14,11 +14,26 @@ use crate::progress::Stage;
 /// The program as a bake's provenance names it.
 pub const PROGRAM: &str = concat!("halflight ", env!("CARGO_PKG_VERSION"));
 
+/// Who looks on while a bake is made: told of every stage and its fraction that is done, 0..=1, and shown what there is of the
+/// light.
+#[derive(Clone, Copy)]
+pub struct Onlooker<'a> {
+    /// Is told how far the work is.
+    pub work: &'a (dyn Fn(&'static str, f64) + Sync),
+    /// Is shown the bake as it grows.
+    pub bake: &'a (dyn Fn(Baked) + Sync),
+}
+
 /// Solves the scene's light; the seconds it took stand beside it.
-pub fn solve(scene: &Scene, flags: &LightFlags) -> (Solution, f64) {
+pub fn solve(scene: &Scene, flags: &LightFlags, onlooker: Option<Onlooker<'_>>) -> (Solution, f64) {
     let stage = Stage::start("solve");
     let options = SolveOptions { link_error: flags.link_error, bounces: flags.bounces };
-    let solution = solver::solve(scene, &options, &|fraction| stage.advance(fraction));
+    let solution = solver::solve(scene, &options, &|fraction| {
+        stage.advance(fraction);
+        if let Some(onlooker) = onlooker {
+            (onlooker.work)("solve", fraction);
+        }
+    });
     (solution, stage.end())
 }
 
@@ -34,16 +49,26 @@ pub struct Bake {
     pub answers: Option<Answers>,
 }
 
-/// Bakes a scene.
-pub fn bake(scene: &Scene, flags: &LightFlags) -> Bake {
-    resume(scene, flags, &LimitFlags::default(), Answers::default(), &Interrupt::default())
+/// Bakes a scene, whoever looks on.
+pub fn bake(scene: &Scene, flags: &LightFlags, onlooker: Option<Onlooker<'_>>) -> Bake {
+    resume(scene, flags, &LimitFlags::default(), Answers::default(), &Interrupt::default(), onlooker)
 }
 
 /// Bakes a scene within limits, with what an interrupted bake of it has found out. Seconds are looked at between rounds, and once
 /// the scene is solved, Ctrl-C at any time.
-pub fn resume(scene: &Scene, flags: &LightFlags, limits: &LimitFlags, answers: Answers, interrupt: &Interrupt) -> Bake {
+pub fn resume(
+    scene: &Scene,
+    flags: &LightFlags,
+    limits: &LimitFlags,
+    answers: Answers,
+    interrupt: &Interrupt,
+    onlooker: Option<Onlooker<'_>>,
+) -> Bake {
     let start = Instant::now();
-    let (solution, solve_seconds) = solve(scene, flags);
+    let (solution, solve_seconds) = solve(scene, flags, onlooker);
+    if let Some(onlooker) = onlooker {
+        (onlooker.bake)(mesher::flat_bake(scene, &solution));
+    }
     let links = solution.links.len();
     let stage = Stage::start("mesh");
     let defaults = BakeOptions::default();
@@ -59,8 +84,14 @@ pub fn resume(scene: &Scene, flags: &LightFlags, limits: &LimitFlags, answers: A
         max_bytes: limits.max_memory.map_or(defaults.max_bytes, |most| usize::try_from(most).unwrap_or(usize::MAX)),
     };
     let late = || limits.max_seconds.is_some_and(|seconds| start.elapsed().as_secs_f64() >= seconds);
-    let control =
-        Control { progress: &|fraction| stage.advance(fraction), stop: &late, interrupted: &|| interrupt.pressed() };
+    let progress = |fraction| {
+        stage.advance(fraction);
+        if let Some(onlooker) = onlooker {
+            (onlooker.work)("mesh", fraction);
+        }
+    };
+    let watch = onlooker.map(|onlooker| onlooker.bake);
+    let control = Control { progress: &progress, stop: &late, interrupted: &|| interrupt.pressed(), watch };
     let mesher::Bake { mut baked, solution, statistics, answers } =
         interrupt.heeded_by(|| mesher::resume(scene, solution, &options, control, answers));
     let mesh_seconds = stage.end();
@@ -91,8 +122,9 @@ pub fn resume(scene: &Scene, flags: &LightFlags, limits: &LimitFlags, answers: A
 }
 
 /// What made a bake: the options as they were used, and the counts. No seconds: the same input gives the same bytes.
-fn provenance(solution: &Solution, options: &BakeOptions, report: &BakeReport, min_weight: f64) -> Provenance {
+fn provenance(solution: &Solution, options: &BakeOptions, report: &BakeReport, min_weight: Option<f64>) -> Provenance {
     let bounces = solution.bounces.map_or_else(|| "all".to_owned(), |bounces| bounces.to_string());
+    let min_weight = min_weight.map_or_else(|| "by leaf".to_owned(), |weight| weight.to_string());
     let option = |name: &str, value: String| (name.to_owned(), value);
     let count = |name: &str, value: usize| (name.to_owned(), value as f64);
     Provenance {
@@ -103,7 +135,7 @@ fn provenance(solution: &Solution, options: &BakeOptions, report: &BakeReport, m
             option(LINK_ERROR, solution.link_error.to_string()),
             option(DISCONTINUITIES, options.discontinuities.to_string()),
             option(WEIGHT, options.weight.name().to_owned()),
-            option(MIN_WEIGHT, min_weight.to_string()),
+            option(MIN_WEIGHT, min_weight),
         ],
         statistics: vec![
             count("elements", report.elements),

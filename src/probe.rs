@@ -108,7 +108,7 @@ fn interpolate(baked: &Baked, points: &[SurfaceQuery]) -> Vec<Option<Rgb>> {
 
 fn gather(scene: &Scene, flags: &LightFlags, points: &[SurfaceQuery]) -> Vec<Option<Rgb>> {
     // A gather from the bake: its reflectors send what the bake says that they do.
-    let solution = pipeline::bake(scene, flags).solution;
+    let solution = pipeline::bake(scene, flags, None).solution;
     let gather = Gather::new(scene, &solution);
     let (bvh, reach) = (Bvh::of_scene(scene), REACH * scene.size());
     let (stage, done) = (Stage::start("gather"), AtomicUsize::new(0));

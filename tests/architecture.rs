@@ -15,7 +15,7 @@ const MAY_NAME: [(&str, &[&str]); 6] = [
 ];
 
 /// Crates of others, and those of ours that alone know them: one, but for the triangulation of surfaces and of the image plane.
-const HOMES: [(&str, &[&str]); 9] = [
+const HOMES: [(&str, &[&str]); 11] = [
     ("obvhs", &["scene"]),
     ("tobj", &["formats"]),
     ("image", &["formats"]),
@@ -24,6 +24,8 @@ const HOMES: [(&str, &[&str]); 9] = [
     ("spade", &["mesher", "renderer"]),
     ("wgpu", &["viewer"]),
     ("winit", &["viewer"]),
+    ("egui", &["viewer"]),
+    ("softbuffer", &["viewer"]),
     ("clap", &["halflight"]),
 ];
 

@@ -9,8 +9,10 @@ mod architecture;
 mod cli;
 mod closed_forms;
 mod continuity;
+mod desktop;
 mod determinism;
 mod fixture;
+mod frames;
 #[path = "../benches/common/generated/mod.rs"]
 mod generated;
 mod generated_scenes;
@@ -28,3 +30,4 @@ mod robustness;
 mod smooth_shading;
 mod textures;
 mod verify;
+mod window;

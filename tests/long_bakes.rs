@@ -14,8 +14,12 @@ use crate::generated::{hall, mtl, obj};
 fn bake(scene: &Scene, tolerance: f64, answers: Answers, most: usize) -> (usize, Bake) {
     let solution = solve(scene, &SolveOptions::default(), &|_| ());
     let asked = AtomicUsize::new(0);
-    let control =
-        Control { progress: &|_| (), stop: &|| false, interrupted: &|| asked.fetch_add(1, Ordering::Relaxed) >= most };
+    let control = Control {
+        progress: &|_| (),
+        stop: &|| false,
+        interrupted: &|| asked.fetch_add(1, Ordering::Relaxed) >= most,
+        watch: None,
+    };
     let bake = mesher::resume(scene, solution, &BakeOptions { tolerance, ..BakeOptions::default() }, control, answers);
     (asked.into_inner(), bake)
 }
@@ -91,7 +95,7 @@ fn memory_is_counted_and_kept_within_its_limit() {
     let bake = |max_bytes, threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         let options = BakeOptions { tolerance: 0.05, max_bytes, ..BakeOptions::default() };
-        let control = Control { progress: &|_| (), stop: &|| false, interrupted: &|| false };
+        let control = Control { progress: &|_| (), stop: &|| false, interrupted: &|| false, watch: None };
         pool.install(|| mesher::bake(&scene, solve(&scene, &SolveOptions::default(), &|_| ()), &options, control))
     };
     let whole = bake(usize::MAX, 2);

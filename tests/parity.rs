@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use scene::Baked;
-use viewer::{Frame, Gpu, Mode, draw_on_cpu, draw_on_gpu};
+use viewer::{Capture, Evaluator, Frame, Gpu, Mode, Picture, Twin, draw_on_cpu, draw_on_gpu};
 
 use crate::fixture::{cornell_box, office};
 
@@ -22,22 +22,42 @@ fn gpu() -> Option<Gpu> {
 }
 
 fn frame(baked: &Baked, mode: Mode) -> Frame {
-    Frame { camera: baked.scene.cameras[0].camera, width: 640, height: 480, mode, exposure: None }
+    Frame {
+        camera: baked.scene.cameras[0].camera,
+        width: 640,
+        height: 480,
+        mode,
+        exposure: None,
+        curve: scene::ToneCurve::default(),
+    }
 }
 
-/// At most 1/255 apart on 99.9 % of the pixels, and as many pixels of background.
+/// The adapter by either evaluator, with and without radiance: at most 1/255 apart from the CPU on 99.9 % of the pixels,
+/// and as many pixels of background.
 fn the_same_picture(bake: &Path, modes: &[Mode]) {
     let Some(gpu) = gpu() else { return };
     let baked = formats::read_baked(bake).unwrap();
-    for &mode in modes {
-        let cpu = draw_on_cpu(&baked, &frame(&baked, mode));
-        let frame = Frame { exposure: Some(cpu.exposure), ..frame(&baked, mode) };
-        let gpu = draw_on_gpu(&gpu, &baked, &frame).unwrap();
-        let near = |(a, b): &(&[u8; 3], &[u8; 3])| a.iter().zip(*b).all(|(a, b)| a.abs_diff(*b) <= 1);
-        let agree = gpu.rgb.iter().zip(&cpu.rgb).filter(near).count();
-        assert!(agree * 1000 >= cpu.rgb.len() * 999, "{mode:?}: {agree} of {} pixels agree", cpu.rgb.len());
-        assert!(gpu.background.abs_diff(cpu.background) * 1000 <= cpu.rgb.len() as u64, "{mode:?}");
-    }
+    let twin = Twin::new(&baked);
+    let compare = |gpu: &Gpu, how: Evaluator| {
+        let capture = Capture::new(gpu, &baked, &twin, 640, 480).unwrap();
+        for &mode in modes {
+            let cpu = twin.draw(&frame(&baked, mode));
+            let frame = Frame { exposure: Some(cpu.exposure), ..frame(&baked, mode) };
+            for gpu in [capture.draw(&frame).unwrap(), capture.display(&frame).unwrap()] {
+                is_the_same(&gpu, &cpu, &format!("{mode}, evaluated by {how:?}"));
+            }
+        }
+    };
+    let host = gpu.with_evaluator(Evaluator::Host);
+    compare(&host, Evaluator::Host);
+    compare(&host.with_evaluator(Evaluator::Adapter), Evaluator::Adapter);
+}
+
+fn is_the_same(gpu: &Picture, cpu: &Picture, what: &str) {
+    let near = |(a, b): &(&[u8; 3], &[u8; 3])| a.iter().zip(*b).all(|(a, b)| a.abs_diff(*b) <= 1);
+    let agree = gpu.rgb.iter().zip(&cpu.rgb).filter(near).count();
+    assert!(agree * 1000 >= cpu.rgb.len() * 999, "{what}: {agree} of {} pixels agree", cpu.rgb.len());
+    assert!(gpu.background.abs_diff(cpu.background) * 1000 <= cpu.rgb.len() as u64, "{what}");
 }
 
 #[test]

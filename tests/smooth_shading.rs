@@ -102,7 +102,7 @@ fn imported(meridians: usize, normals: Normals) -> Scene {
 
 fn bake(scene: &Scene, tolerance: f64) -> mesher::Bake {
     let solution = solver::solve(scene, &SolveOptions::default(), &|_| ());
-    let control = Control { progress: &|_| (), stop: &|| false, interrupted: &|| false };
+    let control = Control { progress: &|_| (), stop: &|| false, interrupted: &|| false, watch: None };
     mesher::bake(scene, solution, &BakeOptions { tolerance, ..BakeOptions::default() }, control)
 }
 

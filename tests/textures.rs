@@ -59,7 +59,8 @@ fn light_is_that_of_the_mean_and_pictures_show_the_texture() {
     let baked = formats::read_baked(&bakes[0]).unwrap();
     let camera =
         Camera { eye: DVec3::new(2.0, 1.5, 2.0), target: DVec3::new(2.0, 1.5, 0.0), up: DVec3::Y, vertical_fov: 1.0 };
-    let frame = Frame { camera, width: 40, height: 20, mode: Mode::Shaded, exposure: None };
+    let frame =
+        Frame { camera, width: 40, height: 20, mode: Mode::Shaded, exposure: None, curve: scene::ToneCurve::default() };
     let picture = draw_on_cpu(&baked, &frame);
     let grey = draw_on_cpu(&formats::read_baked(&bakes[1]).unwrap(), &frame);
     // Texels are bilinear: white in the middle of the left half, black in that of the right one, and the half between.

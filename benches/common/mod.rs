@@ -39,14 +39,24 @@ pub fn bake(scene: &str, options: &[&str], output: &Path) -> Value {
 
 /// User and system seconds of all programs that this one has run to their end; none where the system does not tell.
 pub fn seconds_of_programs() -> Option<f64> {
-    #[cfg(unix)]
-    {
-        use nix::sys::resource::{UsageWho, getrusage};
-        use nix::sys::time::TimeValLike;
-        let usage = getrusage(UsageWho::RUSAGE_CHILDREN).ok()?;
-        Some((usage.user_time() + usage.system_time()).num_microseconds() as f64 * 1e-6)
-    }
-    #[cfg(not(unix))]
+    seconds_of(false)
+}
+
+/// User and system seconds of all threads of this program; none where the system does not tell.
+pub fn seconds_of_threads() -> Option<f64> {
+    seconds_of(true)
+}
+
+#[cfg(unix)]
+fn seconds_of(this_one: bool) -> Option<f64> {
+    use nix::sys::resource::{UsageWho, getrusage};
+    use nix::sys::time::TimeValLike;
+    let usage = getrusage(if this_one { UsageWho::RUSAGE_SELF } else { UsageWho::RUSAGE_CHILDREN }).ok()?;
+    Some((usage.user_time() + usage.system_time()).num_microseconds() as f64 * 1e-6)
+}
+
+#[cfg(not(unix))]
+fn seconds_of(_: bool) -> Option<f64> {
     None
 }
 

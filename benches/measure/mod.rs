@@ -34,7 +34,7 @@ pub fn solved(scene: &Scene, bounces: Option<u32>, coarseness: f64) -> Solution 
 /// A bake on the leaves and lines that it is given: asked for so little that nothing is refined.
 pub fn unrefined(scene: &Scene, solution: &Solution, options: &BakeOptions) -> (Baked, BakeStatistics) {
     let options = BakeOptions { tolerance: 1e6, ..options.clone() };
-    let control = Control { progress: &|_| (), stop: &|| false, interrupted: &|| false };
+    let control = Control { progress: &|_| (), stop: &|| false, interrupted: &|| false, watch: None };
     let bake = mesher::bake(scene, solution.clone(), &options, control);
     (bake.baked, bake.statistics)
 }

@@ -40,7 +40,6 @@
 
 use std::collections::BTreeMap;
 use std::f64::consts::FRAC_PI_2;
-use std::fs;
 use std::path::Path;
 
 use glam::{DMat3, DMat4, DVec3};
@@ -54,9 +53,10 @@ use crate::material_library::LARGEST_REFLECTANCE;
 use crate::model::Model;
 use crate::obj::read_obj;
 use crate::report::ImportReport;
+use crate::toml_text::TomlText;
 
 /// Vertical opening angle of a camera that names none, degrees: wide enough for a room, not yet distorting.
-const DEFAULT_FOV: f64 = 60.0;
+pub(crate) const DEFAULT_FOV: f64 = 60.0;
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -173,18 +173,9 @@ type Wrong = (String, &'static str);
 
 /// Reads a scene file and the models that it names.
 pub(crate) fn read_scene_file(path: &Path, report: &mut ImportReport) -> Result<Model, FormatError> {
-    let bytes = fs::read(path).map_err(|error| FormatError::read(path, error))?;
-    let text = String::from_utf8(bytes)
-        .map_err(|_| FormatError::content(path, "is no text in UTF-8", "give a scene file in TOML"))?;
-    let line = |place: usize| text.bytes().take(place).filter(|byte| *byte == b'\n').count() + 1;
-    let wrong = |place: usize| move |(cause, cure): Wrong| FormatError::line(path, line(place), cause, cure);
-    let file: SceneFile = toml::from_str(&text).map_err(|error| {
-        let place = error.span().map_or(0, |span| span.start);
-        wrong(place)((
-            error.message().trim().replace('\n', ", "),
-            "see the scene file of the README for what may stand here",
-        ))
-    })?;
+    let text = &TomlText::read(path, "give a scene file in TOML")?;
+    let wrong = |place: usize| move |(cause, cure): Wrong| text.wrong(place, cause, cure);
+    let file: SceneFile = text.parse("see the scene file of the README for what may stand here")?;
     let up = file.up.unwrap_or(Axis::Y);
     let unit = metres(file.units).map_err(wrong(0))?;
     if file.model.is_empty() {
@@ -343,6 +334,8 @@ fn camera(entry: &CameraEntry, up: DVec3, unit: f64) -> Result<NamedCamera, Wron
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
+    use std::fs;
+
     use super::*;
     use crate::{Imported, read_scene};
 

@@ -3,19 +3,18 @@
 //! After each round (`rounds`) the whole is measured (`residual`, `claimed_error`). Where it misses the tolerance, the next
 //! round asks for less. Rounds are global: what is divided depends on the light alone, never on threads.
 
-use glam::Vec3;
-use rayon::prelude::*;
-use scene::{Answers, Baked, BakedElement, BakedError, BakedTriangle, HalfEdges, Provenance, Rgb, Scene};
+use scene::{Answers, Baked, BakedError, Rgb, Scene};
 use solver::{Solution, Visibility};
 
 use crate::claimed_error::{P99, mean_reflectance, measured};
 use crate::fine_mesh::{EmittedLight, FineMesh};
 use crate::inquiry::Inquiry;
+use crate::lines::Lines;
 use crate::probe::colour_mean;
 use crate::reflected_light::ReflectedLight;
 use crate::residual::residual;
 use crate::rounds::Rounds;
-use crate::{Discontinuity, Leaf, Mesh, MeshStatistics, Progress, Weight, discontinuities};
+use crate::{MeshStatistics, Progress, Weight};
 
 /// What a bake is asked for.
 #[derive(Clone, Debug, PartialEq)]
@@ -23,7 +22,7 @@ pub struct BakeOptions {
     /// Relative root mean square error of irradiance that is accepted, and a fifth of the error that is accepted at 99 % of
     /// the area; 0..1.
     pub tolerance: f64,
-    /// Discontinuities that a leaf follows at most (k of Hardt & Teller 1996, section 4.2).
+    /// Discontinuities that a leaf follows at most (k of Hardt & Teller 1996, section 4.2); without links no more than three.
     pub discontinuities: u32,
     /// How discontinuities are weighed.
     pub weight: Weight,
@@ -68,7 +67,7 @@ const NEXT_SOURCE_SHARE: f64 = 0.3;
 const BIAS: f64 = 0.25;
 
 /// The error of a bake that was stopped before it was measured.
-const UNMEASURED: BakedError =
+pub(crate) const UNMEASURED: BakedError =
     BakedError { rms: f64::INFINITY, p99: f64::INFINITY, max: f64::INFINITY, points: 0, holds: false };
 
 impl Default for BakeOptions {
@@ -94,6 +93,9 @@ pub struct Control<'a> {
     pub stop: &'a (dyn Fn() -> bool + Sync),
     /// Whether to stop at once with the best that is known: asked all the time, from any thread.
     pub interrupted: &'a (dyn Fn() -> bool + Sync),
+    /// Is shown the bake as it grows, each time that its mesh or its light has changed: coarse to fine, and with an error once it
+    /// is measured. What is shown is a copy: nothing depends on whether anybody looks.
+    pub watch: Option<&'a (dyn Fn(Baked) + Sync)>,
 }
 
 /// A bake, the solution as it was refined for it, and counts.
@@ -114,9 +116,9 @@ pub struct Bake {
 pub struct BakeStatistics {
     /// Rounds of meshing and measurement.
     pub rounds: u32,
-    /// The least weight that was used, in the weight's unit.
-    pub min_weight: f64,
-    /// Discontinuities of at least the least weight, over all polygons.
+    /// The least weight that was used, in the weight's unit; none where every leaf has its own.
+    pub min_weight: Option<f64>,
+    /// Discontinuities of at least the least weight that were found, on all polygons or in all leaves that were looked at.
     pub discontinuities_found: usize,
     /// Discontinuities that at least one leaf follows.
     pub discontinuities_kept: usize,
@@ -151,23 +153,25 @@ pub fn resume(
     answers: Answers,
 ) -> Bake {
     let relative = options.tolerance / BakeOptions::default().tolerance;
-    let min_weight = options.min_weight.unwrap_or_else(|| relative * options.weight.default_minimum(scene, &solution));
+    let has_links = solution.visibility == Visibility::Links;
+    let default_minimum = || relative * options.weight.default_minimum(scene, &solution);
+    let min_weight = options.min_weight.or_else(|| has_links.then(default_minimum));
     (control.progress)(0.0);
-    let found = all_discontinuities(scene, &solution, options.weight, min_weight);
+    let lines = Lines::of_links(scene, &solution, options.weight, min_weight);
     let reflectance = mean_reflectance(scene, &solution);
-    let by_rays = solution.visibility == Visibility::Rays;
     // Without links elements are as small as they need to be at first.
-    let front = if by_rays { 0.0 } else { FRONT_LENGTH * scene.size() };
+    let front = if has_links { FRONT_LENGTH * scene.size() } else { 0.0 };
     let mut rounds = Rounds {
         scene,
         options,
+        watch: control.watch,
         inquiry: Inquiry::new(control, &solution, answers, options.max_bytes),
         emitted: EmittedLight::default(),
         reflected: ReflectedLight::new(&solution, front),
         mean: colour_mean(solution.mean_irradiance),
-        is_guessed: by_rays,
-        found,
-        share: if by_rays { FIRST_SHARE_BY_RAYS } else { FIRST_SHARE },
+        is_guessed: !has_links,
+        lines,
+        share: if has_links { FIRST_SHARE } else { FIRST_SHARE_BY_RAYS },
         source_share: FIRST_SOURCE_SHARE,
         reflectance,
         reflected_errors: Vec::new(),
@@ -187,6 +191,9 @@ pub fn resume(
         }
         let (error, bias) = measured(&points, options.tolerance, rounds.reflectance);
         statistics.rounds += 1;
+        if let Some(watch) = control.watch {
+            watch(rounds.baked(&fine, &samples, error));
+        }
         let too_many = fine.triangles() > options.max_triangles;
         let missed = |error: &BakedError| (error.rms / options.tolerance).max(error.p99 / (P99 * options.tolerance));
         let (last, stop) = (missed(&error), error.holds || too_many || statistics.rounds == ROUNDS || (control.stop)());
@@ -209,78 +216,19 @@ pub fn resume(
         }
     };
     (control.progress)(1.0);
-    let samples: Vec<Vec3> = samples.iter().map(|value| value.max(Rgb::ZERO).as_vec3()).collect();
-    let (vertices, triangles) = stored_triangles(&fine.leaves, &fine.mesh, &fine.table.triangles);
     let statistics = BakeStatistics {
-        discontinuities_found: rounds.found.iter().map(Vec::len).sum(),
+        discontinuities_found: rounds.lines.all().len(),
         discontinuities_kept: fine.lines.len(),
-        vertices: vertices.len(),
-        triangles: triangles.len(),
+        triangles: fine.triangles(),
         samples: samples.len(),
         rows: rounds.reflected.rows(),
         bytes: rounds.inquiry.peak(),
         mesh: fine.mesh.statistics,
         ..statistics
     };
-    let solution = &rounds.solution;
-    let light = if solution.reflects() { &solution.light } else { &solution.irradiance };
-    let element = |leaf: &Leaf| BakedElement {
-        polygon: leaf.polygon,
-        irradiance: light[leaf.element as usize].irradiance.as_vec3(),
-    };
-    let triangle_errors = rounds.triangle_errors(&fine, &samples);
-    let baked = Baked {
-        scene: scene.clone(),
-        vertices,
-        samples,
-        triangle_errors,
-        triangles,
-        elements: fine.leaves.iter().map(element).collect(),
-        lines: fine.lines,
-        error,
-        provenance: Provenance::default(),
-    };
+    let baked = rounds.baked(&fine, &samples, error);
+    let statistics = BakeStatistics { vertices: baked.vertices.len(), ..statistics };
     Bake { baked, solution: rounds.solution, statistics, answers: rounds.inquiry.into_answers() }
-}
-
-/// The discontinuities on every polygon.
-fn all_discontinuities(scene: &Scene, solution: &Solution, weight: Weight, min_weight: f64) -> Vec<Vec<Discontinuity>> {
-    let half_edges = HalfEdges::new(scene);
-    scene
-        .polygon_ids()
-        .into_par_iter()
-        .map(|receiver| {
-            let interactions = solution.interactions(scene, receiver);
-            discontinuities(scene, &half_edges, receiver, &interactions, weight, min_weight)
-        })
-        .collect()
-}
-
-/// The mesh as it is stored: without the vertices that no triangle uses.
-fn stored_triangles(leaves: &[Leaf], mesh: &Mesh, samples: &[[u32; 6]]) -> (Vec<Vec3>, Vec<BakedTriangle>) {
-    const UNUSED: u32 = u32::MAX;
-    let mut stored = vec![UNUSED; mesh.vertices.len()];
-    let mut vertices = Vec::new();
-    let triangles = mesh
-        .triangles
-        .iter()
-        .zip(samples)
-        .map(|(triangle, &samples)| BakedTriangle {
-            vertices: triangle.vertices.map(|vertex| {
-                let id = &mut stored[vertex as usize];
-                if *id == UNUSED {
-                    *id = vertices.len() as u32;
-                    vertices.push(mesh.vertices[vertex as usize].as_vec3());
-                }
-                *id
-            }),
-            samples,
-            polygon: leaves[triangle.leaf as usize].polygon,
-            element: triangle.leaf,
-            edges: triangle.edges,
-        })
-        .collect();
-    (vertices, triangles)
 }
 
 #[cfg(test)]
@@ -327,8 +275,12 @@ mod tests {
     fn baked_with(scene: &Scene, options: &BakeOptions, bounces: Option<u32>) -> (Baked, BakeStatistics) {
         let solution = solve(scene, &SolveOptions { bounces, ..SolveOptions::default() }, &|_| ());
         let progress = |fraction| assert!((0.0..=1.0).contains(&fraction));
-        let bake =
-            bake(scene, solution, options, Control { progress: &progress, stop: &|| false, interrupted: &|| false });
+        let bake = bake(
+            scene,
+            solution,
+            options,
+            Control { progress: &progress, stop: &|| false, interrupted: &|| false, watch: None },
+        );
         (bake.baked, bake.statistics)
     }
 
@@ -354,6 +306,53 @@ mod tests {
             let area: f64 = of_polygon.map(|triangle| scene::area_vector(&baked.corners(triangle)).length()).sum();
             assert!((area / scene.area(polygon) - 1.0).abs() < 1e-6, "the rounding to f32");
         }
+    }
+
+    /// What is watched is a bake at any time, finer and finer, in the end the measured one; and it changes nothing.
+    #[test]
+    fn a_bake_may_be_watched() {
+        let scene = floor_lamp_and_plate();
+        let (alone, _) = baked_with(&scene, &BakeOptions::default(), None);
+        let solution = solve(&scene, &SolveOptions::default(), &|_| ());
+        let flat = crate::flat_bake(&scene, &solution);
+        let shown = std::sync::Mutex::new(vec![flat]);
+        let watch = |baked| shown.lock().unwrap().push(baked);
+        let control = Control { progress: &|_| (), stop: &|| false, interrupted: &|| false, watch: Some(&watch) };
+        assert_eq!(bake(&scene, solution, &BakeOptions::default(), control).baked, alone);
+        let shown = shown.into_inner().unwrap();
+        for baked in &shown {
+            baked.validate().unwrap();
+            let ids = 0..baked.triangles.len() as u32;
+            let area: f64 = ids.map(|triangle| scene::area_vector(&baked.corners(triangle)).length()).sum();
+            assert!((area / scene.surface_area() - 1.0).abs() < 1e-6);
+            assert!(baked.mean_irradiance().min_element() > 0.5 * alone.mean_irradiance().min_element());
+        }
+        assert!(shown.len() > 2, "{} bakes were shown", shown.len());
+        assert!(shown.windows(2).all(|pair| pair[0].triangles.len() <= pair[1].triangles.len()));
+        assert_eq!(shown.last(), Some(&alone));
+        let nothing = solve(&Scene::default(), &SolveOptions::default(), &|_| ());
+        assert!(crate::flat_bake(&Scene::default(), &nothing).triangles.is_empty());
+    }
+
+    /// Tiles far below, which see nothing, make it too many polygons to be linked. Every leaf has a least weight of its own.
+    #[test]
+    fn without_links_leaves_that_are_wanting_follow_discontinuities() {
+        let small = floor_lamp_and_plate();
+        let mut outlines: Vec<Vec<DVec3>> = small.polygon_ids().map(|polygon| small.outline(polygon)).collect();
+        // A lamp so small that its shadow's edge is narrower than the leaves.
+        outlines[1] = rectangle([0.0, 0.0, 2.0], 0.02, false);
+        outlines
+            .extend((0..400).map(|i| rectangle([f64::from(i % 20) * 0.2, f64::from(i / 20) * 0.2, -3.0], 0.05, false)));
+        let mut scene = scene_of(&outlines);
+        scene.materials = small.materials;
+        scene.polygons[1].material = 1;
+        let (with, statistics) = baked(&scene, &BakeOptions { tolerance: 0.02, ..BakeOptions::default() });
+        assert!(statistics.discontinuities_kept > 0 && statistics.min_weight.is_none(), "{statistics:?}");
+        assert!(with.lines.iter().all(|line| (line.receiver, line.source, line.blocker) == (0, 1, 2)));
+        let none = BakeOptions { tolerance: 0.02, discontinuities: 0, ..BakeOptions::default() };
+        let (without, statistics) = baked(&scene, &none);
+        assert_eq!(statistics.discontinuities_kept, 0);
+        assert!(with.error.p99 < without.error.p99, "{:?} {:?}", with.error, without.error);
     }
 
     #[test]

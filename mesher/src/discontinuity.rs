@@ -7,6 +7,8 @@
 //! What we do differently: sources are whole polygons, not the links' elements, so that a line does not depend on how
 //! far the solver divided its source; and a bound on the weight is tested before a swath is built.
 
+use std::collections::HashSet;
+
 use glam::DVec3;
 use scene::{HalfEdges, LineKind, Plane, Scene};
 use solver::Interaction;
@@ -58,6 +60,19 @@ pub fn discontinuities(
     measure: Weight,
     min_weight: f64,
 ) -> Vec<Discontinuity> {
+    let outline = if (receiver as usize) < scene.polygons.len() { scene.outline(receiver) } else { Vec::new() };
+    discontinuities_within(scene, half_edges, (receiver, &outline), interactions, measure, min_weight)
+}
+
+/// The same within a part of the receiver, given by its convex outline: as if the receiver were no larger.
+pub(crate) fn discontinuities_within(
+    scene: &Scene,
+    half_edges: &HalfEdges,
+    (receiver, outline): (u32, &[DVec3]),
+    interactions: &[Interaction],
+    measure: Weight,
+    min_weight: f64,
+) -> Vec<Discontinuity> {
     let count = scene.polygons.len() as u32;
     let exists = |interaction: &Interaction| {
         interaction.source.max(receiver) < count && interaction.blockers.iter().all(|&blocker| blocker < count)
@@ -66,8 +81,8 @@ pub fn discontinuities(
     if interactions.is_empty() {
         return Vec::new();
     }
-    let facets = Facets::around(scene, half_edges, receiver, &interactions);
-    let Some(target) = Receiver::new(&scene.outline(receiver), facets.tolerance) else { return Vec::new() };
+    let facets = Facets::around(scene, half_edges, (receiver, outline), &interactions);
+    let Some(target) = Receiver::new(outline, facets.tolerance) else { return Vec::new() };
     let mut search = Search {
         id: receiver,
         floor: measure.floor_on_receiver(target.diameter),
@@ -76,12 +91,10 @@ pub fn discontinuities(
         min_weight,
         found: Vec::new(),
         events: 0,
-        blocker_of: vec![NONE; scene.polygons.len()],
-        vertex_of: vec![NONE; scene.vertices.len()],
         facets,
     };
-    for (number, interaction) in (0..).zip(interactions) {
-        if let Some(case) = search.case(number, interaction) {
+    for interaction in interactions {
+        if let Some(case) = search.case(interaction) {
             search.horizon(&case);
             search.vertex_edge(&case);
             search.edge_vertex(&case);
@@ -89,9 +102,6 @@ pub fn discontinuities(
     }
     search.found
 }
-
-/// No interaction's number.
-const NONE: u32 = u32::MAX;
 
 /// What the search for a receiver's discontinuities carries along.
 struct Search<'a> {
@@ -104,15 +114,10 @@ struct Search<'a> {
     min_weight: f64,
     found: Vec<Discontinuity>,
     events: u32,
-    /// By polygon, the last interaction whose strong blocker it was.
-    blocker_of: Vec<u32>,
-    /// By vertex, the last interaction that it was looked at in.
-    vertex_of: Vec<u32>,
 }
 
 /// One interaction, prepared.
 struct Case {
-    number: u32,
     source: u32,
     radiosity: f64,
     plane: Plane,
@@ -122,7 +127,7 @@ struct Case {
     front: Vec<DVec3>,
     /// Everything that may stand in a swath.
     occluders: Vec<u32>,
-    /// The occluders that may cause a discontinuity of sufficient weight.
+    /// The occluders that may cause a discontinuity of sufficient weight, ascending.
     strong: Vec<u32>,
 }
 
@@ -137,7 +142,7 @@ impl Case {
 
 impl Search<'_> {
     /// Prepares an interaction; none if no light can pass.
-    fn case(&mut self, number: u32, interaction: &Interaction) -> Option<Case> {
+    fn case(&self, interaction: &Interaction) -> Option<Case> {
         let Interaction { source, radiosity, .. } = *interaction;
         let tolerance = self.facets.tolerance;
         let facet = *self.facets.get(source);
@@ -156,19 +161,16 @@ impl Search<'_> {
             radiosity * self.measure.bound(&facet, self.facets.get(blocker), self.floor) >= self.min_weight
         };
         let strong: Vec<u32> = occluders.iter().copied().filter(can_matter).collect();
-        for &blocker in &strong {
-            self.blocker_of[blocker as usize] = number;
-        }
         let outline = without_flat_corners(&self.facets.corners(source).collect::<Vec<_>>(), tolerance);
         let front = in_front(&outline, &self.receiver.plane);
-        Some(Case { number, source, radiosity, plane: facet.plane, outline, front, occluders, strong })
+        Some(Case { source, radiosity, plane: facet.plane, outline, front, occluders, strong })
     }
 
     /// Swaths between the source's vertices and the blockers' silhouette edges.
     fn vertex_edge(&mut self, case: &Case) {
         for &blocker in &case.strong {
             for half_edge in self.facets.half_edges_of(blocker) {
-                let is_strong = |twin| self.blocker_of[self.facets.polygon(twin) as usize] == case.number;
+                let is_strong = |twin| case.strong.binary_search(&self.facets.polygon(twin)).is_ok();
                 if self.facets.twin(half_edge).is_some_and(|twin| twin < half_edge && is_strong(twin)) {
                     continue;
                 }
@@ -187,10 +189,10 @@ impl Search<'_> {
 
     /// Swaths between the source's edges and the corners of the blockers' silhouettes.
     fn edge_vertex(&mut self, case: &Case) {
+        let mut visited = HashSet::new();
         for &blocker in &case.strong {
             for half_edge in self.facets.half_edges_of(blocker) {
-                let visited = &mut self.vertex_of[self.facets.vertex(half_edge) as usize];
-                if std::mem::replace(visited, case.number) == case.number {
+                if !visited.insert(self.facets.vertex(half_edge)) {
                     continue;
                 }
                 let apex = self.facets.start(half_edge);

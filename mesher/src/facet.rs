@@ -1,13 +1,12 @@
 //! The polygons around one receiver, measured once, so that the search among thousands of swaths allocates nothing.
 
+use std::collections::HashMap;
+
 use glam::DVec3;
 use scene::{HalfEdges, Plane, Scene, centroid};
 use solver::Interaction;
 
 use crate::interval::{Interval, Intervals};
-
-/// A polygon that is not in the table.
-const ABSENT: u32 = u32::MAX;
 
 /// Lengths below this fraction of the scene's size are rounding: a vertex that near a plane lies in it. Coordinates of
 /// a scene file carry six or seven digits, the arithmetic on them fifteen.
@@ -32,7 +31,8 @@ pub(crate) struct Facet {
 pub(crate) struct Facets<'a> {
     scene: &'a Scene,
     half_edges: &'a HalfEdges,
-    slots: Vec<u32>,
+    /// By polygon, its place in the table: no more than what is named, so that many receivers of a large scene can be searched.
+    slots: HashMap<u32, u32>,
     facets: Vec<Facet>,
     /// Length below which two points are one, metres.
     pub(crate) tolerance: f64,
@@ -41,22 +41,21 @@ pub(crate) struct Facets<'a> {
 }
 
 impl<'a> Facets<'a> {
-    /// Gathers what the interactions of a receiver name.
+    /// Gathers what the interactions of a receiver name, which is a polygon or the part of it that has the given outline.
     pub(crate) fn around(
         scene: &'a Scene,
         half_edges: &'a HalfEdges,
-        receiver: u32,
+        (receiver, outline): (u32, &[DVec3]),
         interactions: &[&Interaction],
     ) -> Self {
         let tolerance = TOLERANCE * scene.size();
-        let slots = vec![ABSENT; scene.polygons.len()];
+        let slots = HashMap::new();
         let mut table = Self { scene, half_edges, slots, facets: Vec::new(), tolerance, fans: Vec::new() };
-        let target = Target::new(&scene.outline(receiver));
+        let target = Target::new(outline);
         table.add(receiver, &target);
         for interaction in interactions {
             for &blocker in &interaction.blockers {
-                if table.slots[blocker as usize] == ABSENT {
-                    table.add(blocker, &target);
+                if table.add(blocker, &target) {
                     table.fans.extend(table.half_edges_of(blocker).map(|edge| (scene.corners[edge as usize], edge)));
                 }
             }
@@ -74,20 +73,22 @@ impl<'a> Facets<'a> {
         table
     }
 
-    fn add(&mut self, polygon: u32, target: &Target) {
-        if self.slots[polygon as usize] != ABSENT {
-            return;
+    /// Whether it was not there yet.
+    fn add(&mut self, polygon: u32, target: &Target) -> bool {
+        let slot = self.facets.len() as u32;
+        if *self.slots.entry(polygon).or_insert(slot) != slot {
+            return false;
         }
         let outline = self.scene.outline(polygon);
         let centre = centroid(&outline);
         let radius = outline.iter().map(|corner| corner.distance(centre)).fold(0.0, f64::max);
-        self.slots[polygon as usize] = self.facets.len() as u32;
         let clearance = target.clearance(&outline, self.tolerance);
         self.facets.push(Facet { plane: Plane::through(&outline), centre, radius, clearance });
+        true
     }
 
     pub(crate) fn get(&self, polygon: u32) -> &Facet {
-        &self.facets[self.slots[polygon as usize] as usize]
+        &self.facets[self.slots[&polygon] as usize]
     }
 
     /// The half-edges of blockers that start at the same vertex as one of them.

@@ -13,12 +13,12 @@ use solver::{Cosine, Gather, NodeId, Shafts, Solution};
 
 use crate::guess::guessed_emitted;
 use crate::inquiry::Inquiry;
+use crate::lines::Lines;
 use crate::probe::{colour_mean, probe_point};
 use crate::samples::QueryKey;
 use crate::small_patch::middle_of_small;
 use crate::{
-    Discontinuity, Leaf, LeafSegment, Mesh, RankedLine, SampleQuery, SampleTable, Weight, edge_table, leaf_meshes,
-    rank, sample_table,
+    Leaf, LeafSegment, Mesh, RankedLine, SampleQuery, SampleTable, Weight, edge_table, leaf_meshes, rank, sample_table,
 };
 
 /// Length of patches, as a fraction of the scene's size, below which light from emitters is taken for the same all over them
@@ -54,13 +54,12 @@ impl FineMesh {
     pub fn new(
         scene: &Scene,
         solution: &Solution,
-        found: &[Vec<Discontinuity>],
-        (weight, count): (Weight, usize),
+        (known_lines, weight, count): (&Lines, Weight, usize),
         dim: f64,
         known: &mut EmittedLight,
         inquiry: &mut Inquiry<'_>,
     ) -> Self {
-        let (leaves, lines) = divided_leaves(scene, solution, found, weight, count);
+        let (leaves, lines) = divided_leaves(scene, solution, known_lines, weight, count);
         let mesh = leaf_meshes(&edge_table(scene, &solution.cuts, &leaves));
         let gather = Gather::with_source_error(scene, solution, dim);
         let table = sample_table(scene, &leaves, &mesh, &|polygon, position| gather.contact(polygon, position));
@@ -147,6 +146,15 @@ impl EmittedLight {
         self.light.extend(unknown.iter().map(|query| query.key()).zip(found));
     }
 
+    /// Lends what stands between some leaves and the emitters, to look further.
+    pub fn with_shafts<T>(&mut self, leaves: &[NodeId], look: impl FnOnce(&mut [(NodeId, Shafts)]) -> T) -> T {
+        let mut lent: Vec<(NodeId, Shafts)> =
+            leaves.iter().map(|&leaf| (leaf, self.shafts.remove(&leaf).unwrap_or_default())).collect();
+        let seen = look(&mut lent);
+        self.shafts.extend(lent);
+        seen
+    }
+
     fn at(&self, solution: &Solution, queries: &[SampleQuery], inquiry: &Inquiry<'_>) -> Vec<Rgb> {
         let known = |query: &SampleQuery| self.light.get(&query.key()).map(|&number| inquiry.light(number));
         if inquiry.stopped() {
@@ -160,7 +168,7 @@ impl EmittedLight {
 fn divided_leaves(
     scene: &Scene,
     solution: &Solution,
-    found: &[Vec<Discontinuity>],
+    known: &Lines,
     weight: Weight,
     count: usize,
 ) -> (Vec<Leaf>, Vec<DiscontinuityLine>) {
@@ -172,25 +180,23 @@ fn divided_leaves(
         .into_par_iter()
         .map(|(polygon, element)| {
             let outline = elements.outline(element);
-            let ranked = rank(scene, outline, &found[polygon as usize], weight, count);
+            let candidates = known.on(solution, polygon, element);
+            let ranked = rank(scene, outline, known.all(), candidates, weight, count);
             let segment = |line: RankedLine| LeafSegment { ends: line.ends, line: line.discontinuity };
             let segments = ranked.into_iter().map(segment).collect();
             Leaf { element, polygon, outline: outline.to_vec(), segments }
         })
         .collect();
 
-    // Until here a segment names its line by its place on the polygon; now the lines that are kept are numbered.
-    let mut kept: Vec<(u32, u32)> =
-        leaves.iter().flat_map(|leaf| leaf.segments.iter().map(|segment| (leaf.polygon, segment.line))).collect();
+    // Until here a segment names its line among all that are known; now those that are kept are numbered.
+    let mut kept: Vec<u32> = leaves.iter().flat_map(|leaf| leaf.segments.iter().map(|segment| segment.line)).collect();
     kept.sort_unstable();
     kept.dedup();
-    for leaf in &mut leaves {
-        for segment in &mut leaf.segments {
-            segment.line = kept.partition_point(|&line| line < (leaf.polygon, segment.line)) as u32;
-        }
+    for segment in leaves.iter_mut().flat_map(|leaf| &mut leaf.segments) {
+        segment.line = kept.partition_point(|&line| line < segment.line) as u32;
     }
-    let stored = |&(polygon, line): &(u32, u32)| {
-        let line = &found[polygon as usize][line as usize];
+    let stored = |&line: &u32| {
+        let line = &known.all()[line as usize];
         DiscontinuityLine {
             kind: line.kind,
             receiver: line.receiver,

@@ -24,7 +24,8 @@ pub struct RankedLine {
     pub weight: f64,
 }
 
-/// The `count` strongest discontinuities inside a leaf, strongest first, ties by index.
+/// The `count` strongest discontinuities inside a leaf, of those that `candidates` name by their index, strongest first, ties by
+/// index.
 ///
 /// `leaf` is a convex outline in the plane of the receiver of `discontinuities`, counter-clockwise from the front. The
 /// weights are those of the parts inside the leaf. Lines along the leaf's border divide nothing and are left out.
@@ -33,12 +34,14 @@ pub fn rank(
     scene: &Scene,
     leaf: &[DVec3],
     discontinuities: &[Discontinuity],
+    candidates: impl IntoIterator<Item = u32>,
     measure: Weight,
     count: usize,
 ) -> Vec<RankedLine> {
     let leaf_diameter = diameter(leaf);
     let Some(leaf) = Receiver::new(leaf, SAME_LINE * leaf_diameter) else { return Vec::new() };
-    let inside = |(index, discontinuity): (u32, &Discontinuity)| {
+    let inside = |index: u32| {
+        let discontinuity = &discontinuities[index as usize];
         let part = leaf.clip(discontinuity.ends)?;
         let ends = part.map(|t| discontinuity.ends[0].lerp(discontinuity.ends[1], t));
         if ends[0].distance(ends[1]) <= SAME_LINE * leaf_diameter || leaf.is_on_border(ends) {
@@ -51,7 +54,7 @@ pub fn rank(
         };
         Some(RankedLine { discontinuity: index, ends, weight })
     };
-    let mut lines: Vec<RankedLine> = (0..).zip(discontinuities).filter_map(inside).collect();
+    let mut lines: Vec<RankedLine> = candidates.into_iter().filter_map(inside).collect();
     lines.sort_unstable_by(|a, b| b.weight.total_cmp(&a.weight).then(a.discontinuity.cmp(&b.discontinuity)));
 
     let event = |line: &RankedLine| discontinuities[line.discontinuity as usize].event;
@@ -138,8 +141,12 @@ mod tests {
         rectangle((0.0, 0.0), (1.0, 1.0), 0.0, false)
     }
 
+    fn ranked(leaf: &[DVec3], lines: &[Discontinuity], count: usize) -> Vec<RankedLine> {
+        rank(&Scene::default(), leaf, lines, 0..lines.len() as u32, Weight::Ratio, count)
+    }
+
     fn chosen(lines: &[Discontinuity], count: usize) -> Vec<RankedLine> {
-        rank(&Scene::default(), &leaf(), lines, Weight::Ratio, count)
+        ranked(&leaf(), lines, count)
     }
 
     #[test]
@@ -151,8 +158,8 @@ mod tests {
             line(3, [(1.5, 0.0), (1.5, 1.0)], [0.5; 2], 1.0),
         ];
         assert!(chosen(&lines, 10).is_empty());
-        assert!(rank(&Scene::default(), &[], &lines, Weight::Ratio, 10).is_empty());
-        assert!(rank(&Scene::default(), &[DVec3::ZERO; 4], &lines, Weight::Ratio, 10).is_empty());
+        assert!(ranked(&[], &lines, 10).is_empty());
+        assert!(ranked(&[DVec3::ZERO; 4], &lines, 10).is_empty());
         assert!(chosen(&[line(0, [(0.5, 0.0), (0.5, 1.0)], [0.5; 2], 1.0)], 0).is_empty());
     }
 
@@ -191,7 +198,7 @@ mod tests {
         }
         // In a leaf at the foot d_br is 0: it counts as 1 % of the leaf's diameter.
         let at_foot = [v(-1.0, 0.0, 0.0), v(0.0, 0.0, 0.0), v(0.0, 1.0, 0.0), v(-1.0, 1.0, 0.0)];
-        let weight = rank(&Scene::default(), &at_foot, &[post], Weight::Ratio, 1)[0].weight;
+        let weight = ranked(&at_foot, &[post], 1)[0].weight;
         assert!((weight - 2.0 * 2f64.sqrt() / (0.01 * 2f64.sqrt())).abs() < 1e-9);
     }
 
@@ -221,7 +228,7 @@ mod tests {
             Interaction { source: 3, radiosity: 1.0, blockers: vec![] },
         ];
         let lines = discontinuities(&scene, &HalfEdges::new(&scene), 0, &interactions, Weight::Ratio, 0.0);
-        let kept = rank(&scene, &leaf(), &lines, Weight::Ratio, 100);
+        let kept = rank(&scene, &leaf(), &lines, 0..lines.len() as u32, Weight::Ratio, 100);
         let horizons: Vec<&RankedLine> =
             kept.iter().filter(|line| lines[line.discontinuity as usize].kind == LineKind::Horizon).collect();
         assert_eq!(horizons.len(), 1);

@@ -2,18 +2,19 @@
 //! reflectors.
 
 use glam::{DVec2, Vec3};
-use scene::{Rgb, Scene};
-use solver::{NodeId, Solution, Visibility};
+use scene::{Baked, Rgb, Scene};
+use solver::{Gather, NodeId, Solution, Visibility};
 
+use crate::BakeOptions;
 use crate::claimed_error::LARGEST_REFLECTANCE;
 use crate::fine_mesh::{EmittedLight, FineMesh};
 use crate::guess::guessed_reflected;
 use crate::inquiry::Inquiry;
+use crate::lines::Lines;
 use crate::memory::held;
 use crate::probe::colour_mean;
 use crate::refinement::worst;
 use crate::reflected_light::{Exchange, ReflectedLight};
-use crate::{BakeOptions, Discontinuity};
 
 /// Of the error that is allowed, as much is aimed at when leaves are chosen: their parts keep some of it.
 const AIM: f64 = 0.6;
@@ -25,6 +26,10 @@ const MESHES: u32 = 12;
 /// found wanting for what they are, many by chance.
 const MESHES_BY_RAYS: u32 = 4;
 const FEW: usize = 50;
+
+/// Discontinuities that a leaf follows at most where links have not told them: a leaf that is wanting is divided besides. Ten
+/// double the triangles of a hall, and mend no more.
+const LINES_BY_RAYS: u32 = 3;
 
 /// Leaves with a cell shorter than this fraction of the scene's size are not divided: at a corner of contact the error falls
 /// no faster than its area.
@@ -45,8 +50,10 @@ pub(crate) struct Rounds<'a> {
     pub scene: &'a Scene,
     pub options: &'a BakeOptions,
     pub solution: Solution,
-    pub found: Vec<Vec<Discontinuity>>,
+    pub lines: Lines,
     pub inquiry: Inquiry<'a>,
+    /// Who is shown every mesh, and all that is found out of its light.
+    pub watch: Option<&'a (dyn Fn(Baked) + Sync)>,
     pub emitted: EmittedLight,
     pub reflected: ReflectedLight,
     /// Mean irradiance of all surfaces, averaged over the colours, W·m⁻².
@@ -80,6 +87,7 @@ impl Rounds<'_> {
             if self.inquiry.stopped() {
                 break;
             }
+            self.show(&fine);
             if self.solution.visibility == Visibility::Rays {
                 let samples = self.reflected.irradiance(&self.solution, &fine);
                 self.take_means(&fine, &samples);
@@ -115,11 +123,11 @@ impl Rounds<'_> {
     /// The mesh of the solution's leaves as they are.
     fn fine_mesh(&mut self) -> FineMesh {
         let BakeOptions { discontinuities, weight, .. } = *self.options;
-        let lines = (weight, discontinuities as usize);
+        let most = if self.solution.visibility == Visibility::Rays { LINES_BY_RAYS } else { u32::MAX };
+        let lines = (&self.lines, weight, discontinuities.min(most) as usize);
         let dim = DIM * self.options.tolerance;
-        let fine =
-            FineMesh::new(self.scene, &self.solution, &self.found, lines, dim, &mut self.emitted, &mut self.inquiry);
-        self.inquiry.hold(held(&self.solution, &fine));
+        let fine = FineMesh::new(self.scene, &self.solution, lines, dim, &mut self.emitted, &mut self.inquiry);
+        self.inquiry.hold(held(&self.solution, &fine) + self.lines.bytes());
         fine
     }
 
@@ -134,7 +142,7 @@ impl Rounds<'_> {
         if !self.solution.reflects() {
             return fine.shown.clone();
         }
-        if self.inquiry.stopped() && !self.reflected.is_known() {
+        if !self.reflected.is_known() {
             let guess = |query| guessed_reflected(&self.solution, query, self.reflectance);
             return fine.table.queries.iter().zip(&fine.shown).map(|(query, light)| light + guess(query)).collect();
         }
@@ -188,10 +196,12 @@ impl Rounds<'_> {
                 leaves[leaf].1 += part * (error / own.max(self.mean)).powi(2);
             }
             leaves.iter_mut().for_each(|leaf| leaf.1 = leaf.1.sqrt());
+            self.show(&fine);
             let (divided, _) = self.wanting(&leaves);
             if divided.is_empty() || fine.triangles() > self.options.max_triangles {
                 break;
             }
+            self.look_for_lines(&divided);
             for leaf in divided {
                 self.solution.subdivide(leaf);
             }
@@ -199,6 +209,20 @@ impl Rounds<'_> {
             fine = finer;
         }
         fine
+    }
+
+    /// Looks for lines in leaves that are wanting, where links have not told them, for their parts to follow.
+    fn look_for_lines(&mut self, leaves: &[NodeId]) {
+        if self.solution.visibility == Visibility::Links {
+            return;
+        }
+        let BakeOptions { weight, min_weight, tolerance, .. } = *self.options;
+        let (scene, solution) = (self.scene, &self.solution);
+        let least =
+            |diameter| min_weight.unwrap_or_else(|| weight.minimum_in_leaf(scene, solution, tolerance, diameter));
+        let gather = Gather::with_source_error(scene, solution, DIM * tolerance);
+        let lines = &mut self.lines;
+        self.emitted.with_shafts(leaves, |leaves| lines.search(scene, (solution, &gather), leaves, weight, least));
     }
 
     /// By triangle, what probes find of both kinds of light, relative to max(own, mean) irradiance.

@@ -61,6 +61,10 @@ const LINE_PENUMBRA_FLOOR: f64 = 0.01;
 /// nothing.
 const RATIO_MINIMUM: f64 = 0.4;
 
+/// What light must change by across a leaf, in tolerances of the scene's mean irradiance, for a line that it follows. A
+/// quadratic is off by a sixteenth of that where light bends. A sixth of it makes a twentieth more triangles, and mends nothing.
+const LEAST_CHANGE: f64 = 48.0;
+
 /// w_min of [`Weight::Change`] where none is asked for, in mean irradiances of the scene per size of the scene: so bright a
 /// change moves irradiance by its mean over an eighth of the scene. Eight times as much costs the office's direct light two
 /// thirds more error; half as much gains nothing.
@@ -95,6 +99,14 @@ impl Weight {
             Self::Ratio => RATIO_MINIMUM * brightest(),
             Self::Change if scene.size() > 0.0 => CHANGE_MINIMUM * luminance(solution.mean_irradiance) / scene.size(),
             Self::Change => 0.0,
+        }
+    }
+
+    /// The same for a leaf of a given diameter, metres, that alone is looked over for lines.
+    pub(crate) fn minimum_in_leaf(self, scene: &Scene, solution: &Solution, tolerance: f64, diameter: f64) -> f64 {
+        match self {
+            Self::Ratio => self.default_minimum(scene, solution),
+            Self::Change => LEAST_CHANGE * tolerance * luminance(solution.mean_irradiance) / diameter,
         }
     }
 

@@ -11,8 +11,11 @@ pub struct Exposure {
 /// are compressed instead of clipped. Higher keeps more contrast, lower keeps more of a lamp's surroundings.
 const SHOULDER: f32 = 0.6;
 
+/// Where the filmic curve has long passed 1.
+const FILMIC_END: f32 = 1e3;
+
 /// Mean log-luminance that automatic exposure places a picture at: the "18 % grey" of photography.
-const MIDDLE_GREY: f64 = 0.18;
+pub const MIDDLE_GREY: f64 = 0.18;
 
 impl Exposure {
     /// The exposure that brings the logarithmic mean of the given luminances (W·sr⁻¹·m⁻²) to middle grey.
@@ -34,11 +37,49 @@ impl Exposure {
     }
 }
 
-/// The tone curve, linear to display-linear: identity up to a shoulder, then an exponential approach to 1 with a
-/// continuous slope. The shader `tone_map_pass.wgsl` says the same.
-pub fn tone_curve(linear: f32) -> f32 {
-    let room = 1.0 - SHOULDER;
-    if linear <= SHOULDER { linear.max(0.0) } else { SHOULDER + room * (1.0 - (-(linear - SHOULDER) / room).exp()) }
+/// How exposed light is brought into what a display shows, linear to display-linear 0..=1. The shader `frame.wgsl` says the
+/// same, and numbers the curves in this order.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum ToneCurve {
+    /// Identity up to a shoulder, then an exponential approach to 1 with a continuous slope.
+    #[default]
+    Shoulder,
+    /// Identity, clipped at 1: for measuring.
+    Linear,
+    /// As film has it, with a toe and a shoulder: the fit of K. Narkowicz, "ACES Filmic Tone Mapping Curve" (2015).
+    Filmic,
+}
+
+impl ToneCurve {
+    /// All curves, in the order of their numbers.
+    pub const ALL: [Self; 3] = [Self::Shoulder, Self::Linear, Self::Filmic];
+
+    /// The name on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Shoulder => "shoulder",
+            Self::Linear => "linear",
+            Self::Filmic => "filmic",
+        }
+    }
+
+    /// What a display shows of an exposed value.
+    pub fn apply(self, linear: f32) -> f32 {
+        let x = linear.max(0.0);
+        match self {
+            Self::Shoulder if x <= SHOULDER => x,
+            Self::Shoulder => {
+                let room = 1.0 - SHOULDER;
+                SHOULDER + room * (1.0 - (-(x - SHOULDER) / room).exp())
+            }
+            Self::Linear => x.min(1.0),
+            // Beyond the bound the fit is past 1 anyway, and the squares of huge numbers are no numbers.
+            Self::Filmic => {
+                let x = x.min(FILMIC_END);
+                (x * (2.51 * x + 0.03) / (x * (2.43 * x + 0.59) + 0.14)).min(1.0)
+            }
+        }
+    }
 }
 
 /// An 8-bit sRGB value as a linear one, 0..=1: the inverse of [`encode_srgb`].
@@ -57,11 +98,23 @@ mod tests {
     use super::*;
 
     #[test]
-    fn tone_curve_is_monotone_and_stays_below_one() {
-        let values: Vec<f32> = (0..1000).map(|i| tone_curve(i as f32 * 0.01)).collect();
-        assert!(values.windows(2).all(|pair| pair[0] <= pair[1]));
-        assert!(values.iter().all(|&value| (0.0..=1.0).contains(&value)));
-        assert_eq!(tone_curve(-1.0), 0.0);
+    fn tone_curves_are_monotone_from_zero_to_one() {
+        for curve in ToneCurve::ALL {
+            let values: Vec<f32> = (0..1000).map(|i| curve.apply(i as f32 * 0.01)).collect();
+            assert!(values.windows(2).all(|pair| pair[0] <= pair[1]), "{curve:?}");
+            assert!(values.iter().all(|&value| (0.0..=1.0).contains(&value)), "{curve:?}");
+            assert_eq!([-1.0, 0.0].map(|dark| curve.apply(dark)), [0.0; 2]);
+            assert!([1e30, f32::MAX, f32::INFINITY].iter().all(|&bright| curve.apply(bright) > 0.999), "{curve:?}");
+        }
+    }
+
+    #[test]
+    fn tone_curves_are_what_they_are_named_for() {
+        assert_eq!([0.1, 0.5, 0.9, 1.1].map(|x| ToneCurve::Linear.apply(x)), [0.1, 0.5, 0.9, 1.0]);
+        assert_eq!([0.1, 0.5].map(|x| ToneCurve::Shoulder.apply(x)), [0.1, 0.5]);
+        // (2.51 + 0.03) / (2.43 + 0.59 + 0.14); and a toe: the dark is darker.
+        assert!((ToneCurve::Filmic.apply(1.0) - 0.803_797_5).abs() < 1e-6);
+        assert!(ToneCurve::Filmic.apply(0.01) < 0.005);
     }
 
     #[test]

@@ -12,3 +12,7 @@ const LUMINANCE: Rgb = Rgb::new(0.2126, 0.7152, 0.0722);
 pub fn luminance(colour: Rgb) -> f64 {
     colour.dot(LUMINANCE)
 }
+
+/// Lumens of a watt of light: what Radiance takes its white for, so that its users' scenes keep their lux. Of 683 lm/W at the eye's
+/// best green, equal energy over the visible spectrum makes 179.
+pub const LUMINOUS_EFFICACY: f64 = 179.0;

@@ -8,6 +8,7 @@ mod blocker;
 mod bounding_cone;
 mod clip;
 mod contour;
+mod contribution;
 mod cut;
 mod element;
 mod emitter;
@@ -34,12 +35,14 @@ mod transport;
 mod validate;
 mod visibility;
 
+pub use contribution::Contribution;
 pub use cut::{contact_lines, cut_polygon};
 pub use element::{Elements, Node, NodeId, NodeKind, Patch};
 pub use form_factor::{exchange, form_factor, form_factor_at, point_form_factor};
 pub use irradiance::{Contact, Cosine, Gather};
 pub use lattice::{Fan, hemisphere, spread};
 pub use leaf_gather::{LeafGather, SeenNode};
+pub use linear_fit::colour_slope;
 pub use shafts::Shafts;
 pub use solution::{
     BlockerLists, Convergence, Cut, ElementLight, Interaction, Link, LinkSource, Solution, SolveOptions, Visibility,

@@ -26,7 +26,8 @@ pub fn slope<const N: usize>(samples: impl Iterator<Item = (DVec2, [f64; N], f64
     moments.map(|m| DVec2::new(m.x * vv - m.y * uv, m.y * uu - m.x * uv) / determinant)
 }
 
-/// The same for colours: the gradients along u and v.
+/// Gradients along u and v, per metre, of the plane through the origin that fits samples of a colour best. A sample is its place,
+/// metres, its colour and its weight. Zero where they do not span a plane.
 pub fn colour_slope(samples: impl Iterator<Item = (DVec2, Rgb, f64)>) -> (Rgb, Rgb) {
     let [r, g, b] = slope(samples.map(|(at, value, weight)| (at, value.to_array(), weight)));
     (Rgb::new(r.x, g.x, b.x), Rgb::new(r.y, g.y, b.y))

@@ -13,7 +13,7 @@ use crate::leaf_gather::{LeafGather, Source};
 use crate::polygon_tree::Stands;
 use crate::ray_gather::View;
 use crate::visibility::{Shaft, facing_parts};
-use crate::{Gather, NodeId};
+use crate::{Gather, Interaction, NodeId};
 
 /// Emitters that send an element at most this part of the budget, all together, are one group, of which one is tried. More
 /// scatters.
@@ -21,6 +21,10 @@ const FAINT_GROUP: f64 = 0.2;
 
 /// An emitter that sends at most this part of the budget to an element's middle is seen by rays there.
 const FAINT: f64 = 1.0;
+
+/// An emitter that sends at least this many budgets to an element's middle is strong: its shadows have edges to follow. With less
+/// a hall of many lamps has lines everywhere, which next to nothing changes across.
+const STRONG: f64 = 20.0;
 
 /// What stands between an element and the emitters, as far as it was looked for: it never changes, so that a mesh that comes
 /// later need not look again.
@@ -45,6 +49,24 @@ impl<'a> Gather<'a> {
             Some(_) => self.over_shafts(element, shafts),
             None => self.over_sources(element, |polygon| self.scene.material(polygon).emits()),
         }
+    }
+
+    /// The emitting polygons that shine strongly on an element, if nothing hides them, each with what stands in the shaft between
+    /// the two. Not those of bodies, which are round for the most part, nor those that too much stands before.
+    pub fn strong_emitters(&self, element: NodeId, shafts: &mut Shafts) -> Vec<Interaction> {
+        let leaf = self.over_shafts(element, shafts);
+        let normal = self.geometry.plane(leaf.polygon).normal;
+        let strong = |source: Source| {
+            let blockers = source.blockers.filter(|_| source.body.is_none())?;
+            let radiosity = luminance(self.scene.material(source.polygon).exitance());
+            let form_factor = form_factor_at(leaf.centre, normal, self.geometry.outline(source.polygon));
+            (form_factor * radiosity >= STRONG * self.budget()).then_some(Interaction {
+                source: source.polygon,
+                radiosity,
+                blockers,
+            })
+        };
+        leaf.sources.into_iter().filter_map(strong).collect()
     }
 
     /// A gather whose sources are all emitters that an element faces, each with what stands in the shaft between the two.

@@ -116,7 +116,7 @@ impl Lit {
     /// Solves a scene's light, and bakes it to a tolerance.
     pub fn solve_with(scene: Scene, options: &SolveOptions, tolerance: f64) -> Self {
         let solution = solver::solve(&scene, options, &|_| ());
-        let control = Control { progress: &|_| (), stop: &|| false, interrupted: &|| false };
+        let control = Control { progress: &|_| (), stop: &|| false, interrupted: &|| false, watch: None };
         let bake =
             mesher::bake(&scene, solution.clone(), &BakeOptions { tolerance, ..BakeOptions::default() }, control);
         let bvh = Bvh::of_scene(&scene);

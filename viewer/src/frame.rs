@@ -2,14 +2,17 @@
 
 use bytemuck::{Pod, Zeroable};
 use glam::DVec3;
-use scene::{Camera, Exposure};
+use scene::{Camera, Exposure, ToneCurve};
 
 use crate::{
-    Frame, Gpu, ViewerError,
-    gpu::{ResidentBake, guarded},
+    Evaluator, Frame, Gpu, ViewerError,
+    gpu::{ResidentBake, ResidentLight, bind_group, guarded},
+    host_pass::HostPass,
     interpolant_pass::InterpolantPass,
-    tone_map_pass::ToneMapPass,
-    visibility_pass::VisibilityPass,
+    mesh_pass::DEPTH_FORMAT,
+    timestamps::Timestamps,
+    timing::FrameTimes,
+    visibility_pass,
 };
 
 /// Distance of the near plane, metres. Reversed infinite depth loses no precision by a near plane this close, and an
@@ -28,7 +31,7 @@ pub(crate) struct FrameUniform {
     pub up: [f32; 3],
     pub is_light: u32,
     pub forward: [f32; 3],
-    pub padding: u32,
+    pub curve: u32,
     pub size: [f32; 2],
     pub padding_size: [f32; 2],
 }
@@ -51,27 +54,15 @@ impl FrameUniform {
             up: up.as_vec3().to_array(),
             is_light: frame.mode.is_light().into(),
             forward: forward.as_vec3().to_array(),
-            padding: 0,
+            curve: frame.curve as u32,
             size: [frame.width as f32, frame.height as f32],
             padding_size: [0.0; 2],
         }
     }
-}
 
-/// The passes' pipelines, for one format of the output.
-pub(crate) struct Passes {
-    pub visibility: VisibilityPass,
-    pub interpolant: InterpolantPass,
-    pub tone_map: ToneMapPass,
-}
-
-impl Passes {
-    pub fn new(device: &wgpu::Device, output: wgpu::TextureFormat) -> Self {
-        Self {
-            visibility: VisibilityPass::new(device),
-            interpolant: InterpolantPass::new(device),
-            tone_map: ToneMapPass::new(device, output),
-        }
+    /// The frame's tone curve.
+    pub fn tone_curve(&self) -> ToneCurve {
+        ToneCurve::ALL[self.curve as usize]
     }
 }
 
@@ -79,14 +70,26 @@ impl Passes {
 pub(crate) struct Targets {
     pub width: u32,
     pub height: u32,
-    /// Radiance or display-linear colour; the fourth number is 1 where something was hit.
-    pub picture: wgpu::Texture,
-    pub visibility: wgpu::TextureView,
+    /// Which triangle is seen at every pixel.
+    pub visibility: wgpu::Texture,
+    visibility_view: wgpu::TextureView,
     pub depth: wgpu::TextureView,
-    uniform: wgpu::Buffer,
-    pub visibility_inputs: wgpu::BindGroup,
-    pub interpolant_inputs: wgpu::BindGroup,
-    pub tone_map_inputs: wgpu::BindGroup,
+    pub uniform: wgpu::Buffer,
+    visibility_inputs: wgpu::BindGroup,
+    pub evaluation: Evaluation,
+}
+
+/// Where pass (c) writes to, and pass (d) reads from.
+pub(crate) enum Evaluation {
+    /// On the adapter.
+    Adapter {
+        /// Radiance or display-linear colour; the fourth number is 1 where something was hit.
+        picture: wgpu::Texture,
+        interpolant_inputs: wgpu::BindGroup,
+        tone_map_inputs: wgpu::BindGroup,
+    },
+    /// In the host's memory.
+    Host(HostPass),
 }
 
 impl Targets {
@@ -102,60 +105,155 @@ impl Targets {
         if width.max(height) > limit {
             return Err(ViewerError::PictureTooLarge { width, height, limit });
         }
-        guarded(&gpu.device, || {
-            let texture = |label, format, usage| {
-                gpu.device.create_texture(&wgpu::TextureDescriptor {
-                    label: Some(label),
-                    size: wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
-                    mip_level_count: 1,
-                    sample_count: 1,
-                    dimension: wgpu::TextureDimension::D2,
-                    format,
-                    usage: usage | wgpu::TextureUsages::TEXTURE_BINDING,
-                    view_formats: &[],
-                })
-            };
-            let attachment = wgpu::TextureUsages::RENDER_ATTACHMENT;
-            let written = wgpu::TextureUsages::STORAGE_BINDING | wgpu::TextureUsages::COPY_SRC;
-            let view = |texture: &wgpu::Texture| texture.create_view(&wgpu::TextureViewDescriptor::default());
-            let visibility = view(&texture("visibility", VisibilityPass::FORMAT, attachment));
-            let depth = view(&texture("depth", VisibilityPass::DEPTH_FORMAT, attachment));
-            let picture = texture("picture", InterpolantPass::FORMAT, written);
+        let size = [width, height];
+        let attachment = wgpu::TextureUsages::RENDER_ATTACHMENT;
+        let read = wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_SRC;
+        let (visibility, depth, uniform) = guarded(&gpu.device, || {
             let uniform = gpu.device.create_buffer(&wgpu::BufferDescriptor {
                 label: Some("frame"),
                 size: size_of::<FrameUniform>() as u64,
                 usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
                 mapped_at_creation: false,
             });
-            let passes = &gpu.passes;
-            Self {
-                visibility_inputs: passes.visibility.inputs(&gpu.device, &uniform),
-                interpolant_inputs: passes.interpolant.inputs(&gpu.device, &uniform, &visibility, &view(&picture)),
-                tone_map_inputs: passes.tone_map.inputs(&gpu.device, &uniform, &view(&picture)),
-                width,
-                height,
-                picture,
-                visibility,
-                depth,
-                uniform,
-            }
+            let visibility = texture(gpu, "visibility", size, visibility_pass::FORMAT, attachment | read);
+            (visibility, texture(gpu, "depth", size, DEPTH_FORMAT, attachment), uniform)
+        })?;
+        let view = |texture: &wgpu::Texture| texture.create_view(&wgpu::TextureViewDescriptor::default());
+        let visibility_view = view(&visibility);
+        let evaluation = match gpu.evaluator {
+            Evaluator::Host => Evaluation::Host(HostPass::new(gpu, &visibility)?),
+            Evaluator::Adapter => guarded(&gpu.device, || {
+                let written = wgpu::TextureUsages::STORAGE_BINDING | read;
+                let picture = texture(gpu, "picture", size, InterpolantPass::FORMAT, written);
+                let passes = &gpu.passes;
+                Evaluation::Adapter {
+                    interpolant_inputs: passes.interpolant().inputs(
+                        &gpu.device,
+                        &uniform,
+                        &visibility_view,
+                        &view(&picture),
+                    ),
+                    tone_map_inputs: passes.tone_map().inputs(&gpu.device, &uniform, &view(&picture)),
+                    picture,
+                }
+            })?,
+        };
+        guarded(&gpu.device, || Self {
+            width,
+            height,
+            visibility_inputs: bind_group(
+                &gpu.device,
+                &gpu.passes.visibility().layout(),
+                &[uniform.as_entire_binding()],
+            ),
+            visibility,
+            visibility_view,
+            depth: view(&depth),
+            uniform,
+            evaluation,
         })
+    }
+
+    /// Tells the passes of a frame whose camera is valid.
+    pub fn write_uniform(&self, gpu: &Gpu, frame: &Frame, exposure: Exposure) {
+        gpu.queue.write_buffer(&self.uniform, 0, bytemuck::bytes_of(&FrameUniform::of(frame, exposure)));
     }
 }
 
-/// Draws a frame whose camera is valid: what is seen, how bright it is, and what a display makes of it.
-pub(crate) fn encode_frame(
+/// A picture of one sample a pixel in the adapter's memory.
+pub(crate) fn texture(
     gpu: &Gpu,
+    label: &str,
+    [width, height]: [u32; 2],
+    format: wgpu::TextureFormat,
+    usage: wgpu::TextureUsages,
+) -> wgpu::Texture {
+    gpu.device.create_texture(&wgpu::TextureDescriptor {
+        label: Some(label),
+        size: wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
+        mip_level_count: 1,
+        sample_count: 1,
+        dimension: wgpu::TextureDimension::D2,
+        format,
+        usage,
+        view_formats: &[],
+    })
+}
+
+/// A frame whose camera is valid, what it shows, and what it is drawn with.
+#[derive(Clone, Copy)]
+pub(crate) struct Drawing<'a> {
+    pub gpu: &'a Gpu,
+    pub bake: &'a ResidentBake,
+    pub targets: &'a Targets,
+    pub frame: &'a Frame,
+    pub exposure: Exposure,
+    /// Tells what the passes took, where somebody asks.
+    pub times: Option<&'a Timestamps>,
+}
+
+/// Draws a frame: what is seen, how bright it is, and what a display makes of it.
+///
+/// Where the host evaluates, what is seen has been drawn and evaluated when this returns, with what it took; the encoder then
+/// brings it to the output. An adapter tells its times later.
+///
+/// # Errors
+/// [`ViewerError::Driver`] where the host waits for a driver that fails.
+pub(crate) fn encode_frame(
+    drawing: &Drawing<'_>,
     encoder: &mut wgpu::CommandEncoder,
-    bake: &ResidentBake,
-    targets: &Targets,
-    frame: &Frame,
-    exposure: Exposure,
     output: &wgpu::TextureView,
-) {
-    let uniform = FrameUniform::of(frame, exposure);
-    gpu.queue.write_buffer(&targets.uniform, 0, bytemuck::bytes_of(&uniform));
-    gpu.passes.visibility.encode(encoder, targets, bake);
-    gpu.passes.interpolant.encode(encoder, targets, bake, frame.mode);
-    gpu.passes.tone_map.encode(encoder, targets, output);
+) -> Result<Option<FrameTimes>, ViewerError> {
+    match &drawing.targets.evaluation {
+        Evaluation::Host(pass) => {
+            let took = pass.evaluate(drawing)?;
+            pass.encode(drawing.gpu, encoder, output);
+            Ok(Some(took))
+        }
+        Evaluation::Adapter { .. } => {
+            encode_passes(drawing, encoder, output);
+            if let Some(times) = drawing.times {
+                times.resolve(encoder, PASSES.len() as u32);
+            }
+            Ok(None)
+        }
+    }
+}
+
+/// Passes that [`encode_passes`] may tell the times of, in their order.
+pub(crate) const PASSES: [&str; 3] = ["visibility", "interpolant", "tone_map"];
+
+/// Draws a frame that the adapter evaluates.
+pub(crate) fn encode_passes(drawing: &Drawing<'_>, encoder: &mut wgpu::CommandEncoder, output: &wgpu::TextureView) {
+    encode_visibility(drawing, encoder);
+    let Drawing { gpu, bake, targets, frame, times, .. } = drawing;
+    // A bake and the pictures that it is drawn on are for the same adapter, which has one evaluator.
+    if let (
+        ResidentLight::Adapter { inputs, is_textured },
+        Evaluation::Adapter { interpolant_inputs, tone_map_inputs, .. },
+    ) = (&bake.light, &targets.evaluation)
+    {
+        gpu.passes.interpolant().encode(
+            encoder,
+            [interpolant_inputs, inputs],
+            (frame.mode, *is_textured),
+            [targets.width, targets.height],
+            times.map(|times| times.of_compute(1)),
+        );
+        gpu.passes.tone_map().encode(encoder, tone_map_inputs, output, times.map(|times| times.of_render(2)));
+    }
+}
+
+/// Passes (a) and (b), where somebody else does the rest.
+pub(crate) fn encode_visibility(drawing: &Drawing<'_>, encoder: &mut wgpu::CommandEncoder) {
+    let &Drawing { gpu, bake, targets, frame, exposure, times } = drawing;
+    targets.write_uniform(gpu, frame, exposure);
+    gpu.passes.visibility().encode(
+        encoder,
+        [&targets.visibility_view, &targets.depth],
+        &targets.visibility_inputs,
+        &bake.mesh,
+        &bake.chunks.in_view(&frame.camera, targets.width, targets.height),
+        times.map(|times| times.of_render(0)),
+    );
 }

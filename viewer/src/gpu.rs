@@ -1,12 +1,17 @@
 //! The graphics adapter, and a bake in its memory.
 
+use std::sync::Arc;
+
 use wgpu::util::DeviceExt;
 
 use crate::{
     ViewerError,
-    frame::Passes,
-    interpolant_pass::ModePipelines,
+    chunks::Chunks,
+    id_mesh::IdVertex,
+    mesh_pass::Mesh,
+    passes::Passes,
     records::{Corners, Records, TriangleRecord},
+    timestamps::Timestamps,
 };
 
 /// Triangle ids plus one leave the top bit of the visibility buffer to the back sides.
@@ -18,6 +23,25 @@ pub struct Gpu {
     pub(crate) device: wgpu::Device,
     pub(crate) queue: wgpu::Queue,
     pub(crate) passes: Passes,
+    pub(crate) evaluator: Evaluator,
+}
+
+/// Who does passes (c) and (d): finds the light at every pixel, and what a display shows of it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Evaluator {
+    /// Shaders of the adapter.
+    Adapter,
+    /// The host's threads, as in the paper. The adapter draws ids alone.
+    Host,
+}
+
+impl Evaluator {
+    /// Who does it on an adapter of a type. One that is a CPU itself takes five to nine times as long for it as the host, and
+    /// three times with the best shader that was found (`data/record/2026-11-25-frames.md`): it reads a triangle number by
+    /// number for every pixel, the host once for all neighbours.
+    fn of(adapter: wgpu::DeviceType) -> Self {
+        if adapter == wgpu::DeviceType::Cpu { Self::Host } else { Self::Adapter }
+    }
 }
 
 impl Gpu {
@@ -40,6 +64,7 @@ impl Gpu {
         .map_err(|cause| ViewerError::NoAdapter(cause.to_string()))?;
         let (device, queue) = pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor {
             label: Some("viewer"),
+            required_features: adapter.features() & Timestamps::FEATURE,
             // All that the adapter has: a bake needs large buffers, and a poster large textures.
             required_limits: adapter.limits(),
             ..Default::default()
@@ -49,8 +74,16 @@ impl Gpu {
             Some(surface) => surface_format(surface, &adapter)?.remove_srgb_suffix(),
             None => wgpu::TextureFormat::Rgba8Unorm,
         };
-        let passes = guarded(&device, || Passes::new(&device, output))?;
-        Ok(Self { adapter, device, queue, passes })
+        let info = adapter.get_info();
+        // OpenGL hands flat attributes on from the last corner, all others from the first.
+        let is_shared = info.backend != wgpu::Backend::Gl;
+        let passes = Passes::new(&device, output, surface.is_some(), is_shared);
+        Ok(Self { adapter, device, queue, passes, evaluator: Evaluator::of(info.device_type) })
+    }
+
+    /// The adapter, with another evaluator than the one that is likely the faster: to set them side by side.
+    pub fn with_evaluator(self, evaluator: Evaluator) -> Self {
+        Self { evaluator, ..self }
     }
 
     /// The adapter's name, as its driver gives it.
@@ -98,54 +131,72 @@ pub(crate) fn bind_group(
 
 /// A bake in the adapter's memory.
 pub(crate) struct ResidentBake {
-    /// Number of triangles.
-    pub triangles: u32,
-    /// Corner positions, three to a triangle.
-    pub corners: wgpu::Buffer,
-    /// What the interpolant pass reads: triangles, elements, corners, textures.
-    pub interpolants: wgpu::BindGroup,
-    /// The interpolant pass's pipelines, where the bake has textures.
-    pub textured: Option<ModePipelines>,
+    /// Where the triangles are.
+    pub chunks: Chunks,
+    /// What the visibility pass draws.
+    pub mesh: Mesh,
+    /// What pass (c) reads.
+    pub light: ResidentLight,
+}
+
+/// The light of a bake, where pass (c) finds it.
+pub(crate) enum ResidentLight {
+    /// For the adapter: triangles, elements, corners, textures, and whether there are any.
+    Adapter { inputs: wgpu::BindGroup, is_textured: bool },
+    /// For the host.
+    Host(Arc<Records>),
 }
 
 impl ResidentBake {
     /// Copies a bake's records to the adapter.
     ///
     /// # Errors
-    /// [`ViewerError::TooManyTriangles`] and [`ViewerError::TexturesTooLarge`] when they exceed one of the adapter's buffers, [`ViewerError::Driver`] when
-    /// its memory is full.
-    pub fn upload(gpu: &Gpu, records: &Records) -> Result<Self, ViewerError> {
-        let limits = gpu.device.limits();
-        let largest = limits.max_buffer_size.min(limits.max_storage_buffer_binding_size);
-        let limit = (largest / size_of::<TriangleRecord>() as u64).min(LARGEST_ID_COUNT);
-        let triangles = records.triangles.len();
-        if triangles as u64 > limit || size_of_val(&*records.elements) as u64 > largest {
-            return Err(ViewerError::TooManyTriangles { triangles, limit });
-        }
-        let texture_bytes = size_of_val(&*records.textures) as u64;
-        if texture_bytes > largest {
-            return Err(ViewerError::TexturesTooLarge { bytes: texture_bytes, limit: largest });
-        }
-        guarded(&gpu.device, || {
-            // A binding must not be empty; an empty bake has one record that nothing reads.
-            let storage = |label, bytes: &[u8], one: usize, usage| {
-                let nothing = vec![0; one];
-                let contents = if bytes.is_empty() { &nothing } else { bytes };
-                let usage = wgpu::BufferUsages::STORAGE | usage;
-                gpu.device.create_buffer_init(&wgpu::util::BufferInitDescriptor { label: Some(label), contents, usage })
-            };
-            let none = wgpu::BufferUsages::empty();
-            let record_bytes = bytemuck::cast_slice(&records.triangles);
-            let records_ = storage("triangles", record_bytes, size_of::<TriangleRecord>(), none);
-            let elements = storage("elements", bytemuck::cast_slice(&records.elements), 16, none);
-            let corner_bytes = bytemuck::cast_slice(&records.corners);
-            let corners = storage("corners", corner_bytes, size_of::<Corners>(), wgpu::BufferUsages::VERTEX);
-            let textures = storage("textures", bytemuck::cast_slice(&records.textures), 4, none);
-            let buffers = [&records_, &elements, &corners, &textures].map(wgpu::Buffer::as_entire_binding);
-            let pass = &gpu.passes.interpolant;
-            let interpolants = bind_group(&gpu.device, &pass.bake_layout, &buffers);
-            let textured = (!records.textures.is_empty()).then(|| pass.textured(&gpu.device));
-            Self { triangles: triangles as u32, corners, interpolants, textured }
-        })
+    /// [`ViewerError::TooManyTriangles`] and [`ViewerError::TexturesTooLarge`] when they exceed one of the adapter's
+    /// buffers, [`ViewerError::Driver`] when its memory is full.
+    pub fn upload(gpu: &Gpu, records: &Arc<Records>) -> Result<Self, ViewerError> {
+        let light = match gpu.evaluator {
+            Evaluator::Adapter => upload_light(gpu, records)?,
+            Evaluator::Host => ResidentLight::Host(records.clone()),
+        };
+        check_count(records, gpu.device.limits().max_buffer_size / (3 * size_of::<IdVertex>() as u64))?;
+        let unshared = (!gpu.passes.shares_vertices).then(|| records.mesh.unshared());
+        let mesh = unshared.as_ref().unwrap_or(&records.mesh);
+        let mesh = guarded(&gpu.device, || Mesh::upload(&gpu.device, "triangles", &mesh.vertices, &mesh.indices))?;
+        Ok(Self { chunks: Chunks::of(&records.corners), mesh, light })
     }
+}
+
+fn check_count(records: &Records, limit: u64) -> Result<(), ViewerError> {
+    let (triangles, limit) = (records.triangles.len(), limit.min(LARGEST_ID_COUNT));
+    if triangles as u64 > limit { Err(ViewerError::TooManyTriangles { triangles, limit }) } else { Ok(()) }
+}
+
+fn upload_light(gpu: &Gpu, records: &Records) -> Result<ResidentLight, ViewerError> {
+    let limits = gpu.device.limits();
+    let largest = limits.max_buffer_size.min(limits.max_storage_buffer_binding_size);
+    check_count(records, largest / size_of::<TriangleRecord>() as u64)?;
+    if size_of_val(&*records.elements) as u64 > largest {
+        let limit = largest / size_of::<[f32; 4]>() as u64;
+        return Err(ViewerError::TooManyTriangles { triangles: records.triangles.len(), limit });
+    }
+    let texture_bytes = size_of_val(&*records.textures) as u64;
+    if texture_bytes > largest {
+        return Err(ViewerError::TexturesTooLarge { bytes: texture_bytes, limit: largest });
+    }
+    guarded(&gpu.device, || {
+        // A binding must not be empty; an empty bake has one record that nothing reads.
+        let storage = |label, bytes: &[u8], one: usize| {
+            let nothing = vec![0; one];
+            let contents = if bytes.is_empty() { &nothing } else { bytes };
+            let usage = wgpu::BufferUsages::STORAGE;
+            gpu.device.create_buffer_init(&wgpu::util::BufferInitDescriptor { label: Some(label), contents, usage })
+        };
+        let triangles = storage("light", bytemuck::cast_slice(&records.triangles), size_of::<TriangleRecord>());
+        let elements = storage("elements", bytemuck::cast_slice(&records.elements), size_of::<[f32; 4]>());
+        let corners = storage("corners", bytemuck::cast_slice(&records.corners), size_of::<Corners>());
+        let textures = storage("textures", bytemuck::cast_slice(&records.textures), size_of::<u32>());
+        let buffers = [&triangles, &elements, &corners, &textures].map(wgpu::Buffer::as_entire_binding);
+        let inputs = bind_group(&gpu.device, &gpu.passes.interpolant().bake_layout, &buffers);
+        ResidentLight::Adapter { inputs, is_textured: !records.textures.is_empty() }
+    })
 }

@@ -1,6 +1,8 @@
 //! Pass (c): the light at every pixel (Hardt & Teller 1996, section 2.6), one compute invocation a pixel.
 
-use crate::{Mode, frame::Targets, gpu::ResidentBake, gpu::bind_group};
+use std::sync::OnceLock;
+
+use crate::{Mode, gpu::bind_group};
 
 /// Source of the shader.
 pub(crate) const SHADER: &str =
@@ -9,17 +11,16 @@ pub(crate) const SHADER: &str =
 /// Side of the square of pixels that a workgroup takes; the shader says the same.
 const WORKGROUP: u32 = 8;
 
-/// One pipeline a mode.
-pub(crate) type ModePipelines = [wgpu::ComputePipeline; Mode::ALL.len()];
-
-/// The pass for bakes without textures, one pipeline a mode: a software adapter runs both sides of every branch that it cannot fold.
+/// The pass. Every mode has a pipeline of its own, and each another one for bakes with textures: a software adapter runs
+/// both sides of every branch that it cannot fold. They are made when they are first drawn with.
 pub(crate) struct InterpolantPass {
-    pipelines: ModePipelines,
+    device: wgpu::Device,
     module: wgpu::ShaderModule,
     pipeline_layout: wgpu::PipelineLayout,
     frame_layout: wgpu::BindGroupLayout,
     /// Layout of what the pass reads of a bake: triangles, elements, corners, textures.
     pub bake_layout: wgpu::BindGroupLayout,
+    pipelines: [[OnceLock<wgpu::ComputePipeline>; 2]; Mode::ALL.len()],
 }
 
 impl InterpolantPass {
@@ -65,13 +66,14 @@ impl InterpolantPass {
             bind_group_layouts: &[Some(&frame_layout), Some(&bake_layout)],
             immediate_size: 0,
         });
-        let pipelines = pipelines(device, &module, &pipeline_layout, false);
-        Self { pipelines, module, pipeline_layout, frame_layout, bake_layout }
-    }
-
-    /// The pipelines for a bake with textures.
-    pub fn textured(&self, device: &wgpu::Device) -> ModePipelines {
-        pipelines(device, &self.module, &self.pipeline_layout, true)
+        Self {
+            device: device.clone(),
+            module,
+            pipeline_layout,
+            frame_layout,
+            bake_layout,
+            pipelines: Default::default(),
+        }
     }
 
     /// What the pass reads and writes besides the bake.
@@ -87,36 +89,35 @@ impl InterpolantPass {
         bind_group(device, &self.frame_layout, &resources)
     }
 
-    /// Evaluates every pixel of the visibility buffer.
-    pub fn encode(&self, encoder: &mut wgpu::CommandEncoder, targets: &Targets, bake: &ResidentBake, mode: Mode) {
+    /// Evaluates every pixel of a visibility buffer of a width and height.
+    pub fn encode(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        inputs: [&wgpu::BindGroup; 2],
+        (mode, is_textured): (Mode, bool),
+        [width, height]: [u32; 2],
+        times: Option<wgpu::ComputePassTimestampWrites<'_>>,
+    ) {
         let mut pass = encoder
-            .begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some("interpolant"), timestamp_writes: None });
-        pass.set_pipeline(&bake.textured.as_ref().unwrap_or(&self.pipelines)[mode as usize]);
-        pass.set_bind_group(0, &targets.interpolant_inputs, &[]);
-        pass.set_bind_group(1, &bake.interpolants, &[]);
-        pass.dispatch_workgroups(targets.width.div_ceil(WORKGROUP), targets.height.div_ceil(WORKGROUP), 1);
+            .begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some("interpolant"), timestamp_writes: times });
+        pass.set_pipeline(self.pipeline(mode, is_textured));
+        (0..).zip(inputs).for_each(|(group, inputs)| pass.set_bind_group(group, inputs, &[]));
+        pass.dispatch_workgroups(width.div_ceil(WORKGROUP), height.div_ceil(WORKGROUP), 1);
     }
-}
 
-fn pipelines(
-    device: &wgpu::Device,
-    module: &wgpu::ShaderModule,
-    layout: &wgpu::PipelineLayout,
-    textured: bool,
-) -> ModePipelines {
-    Mode::ALL.map(|mode| {
-        device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-            label: Some(mode.name()),
-            layout: Some(layout),
-            module,
-            entry_point: Some("interpolate"),
-            compilation_options: wgpu::PipelineCompilationOptions {
-                constants: &[("MODE", f64::from(mode as u8)), ("TEXTURED", f64::from(u8::from(textured)))],
-                ..Default::default()
-            },
-            cache: None,
+    fn pipeline(&self, mode: Mode, is_textured: bool) -> &wgpu::ComputePipeline {
+        self.pipelines[mode as usize][usize::from(is_textured)].get_or_init(|| {
+            let constants = [("MODE", f64::from(mode as u8)), ("TEXTURED", f64::from(u8::from(is_textured)))];
+            self.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+                label: Some(mode.name()),
+                layout: Some(&self.pipeline_layout),
+                module: &self.module,
+                entry_point: Some("interpolate"),
+                compilation_options: wgpu::PipelineCompilationOptions { constants: &constants, ..Default::default() },
+                cache: None,
+            })
         })
-    })
+    }
 }
 
 #[cfg(test)]

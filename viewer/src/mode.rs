@@ -23,13 +23,18 @@ pub enum Mode {
     /// The light, dimmed, and the discontinuities that the mesh follows: horizon lines yellow, edge–vertex events
     /// magenta, vertex–edge events cyan, the brighter the heavier; cuts white, leaf borders faint grey.
     Discontinuities,
-    /// Luminance on a logarithmic ramp of ten stops around middle grey: black, purple, red, orange, yellow.
+    /// Illuminance on a logarithmic ramp of ten stops around middle grey: black, purple, red, orange, yellow; with lines
+    /// where it is 1, 2 or 5 times a power of ten lux ([`FalseColorScale`](crate::FalseColorScale)).
     FalseColor,
+    /// The light alone: what the picture would be if every surface were white, without its texture.
+    Light,
+    /// Gouraud in the left half, the quadratic interpolants in the right one (the paper's figures 7 and 8 in one).
+    Split,
 }
 
 impl Mode {
     /// All modes. The shader `interpolant_pass.wgsl` numbers them in this order.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 10] = [
         Self::Shaded,
         Self::Gouraud,
         Self::Ids,
@@ -38,6 +43,8 @@ impl Mode {
         Self::Mesh,
         Self::Discontinuities,
         Self::FalseColor,
+        Self::Light,
+        Self::Split,
     ];
 
     /// The name on the command line.
@@ -51,13 +58,20 @@ impl Mode {
             Self::Mesh => "mesh",
             Self::Discontinuities => "discontinuities",
             Self::FalseColor => "false-color",
+            Self::Light => "light",
+            Self::Split => "split",
         }
     }
 
     /// Whether the picture is light alone, which the tone map exposes. The others are diagrams: the interpolant pass
     /// has exposed what light they show and drawn over it, so their colours go to the display as they are.
     pub fn is_light(self) -> bool {
-        matches!(self, Self::Shaded | Self::Gouraud)
+        matches!(self, Self::Shaded | Self::Gouraud | Self::Light | Self::Split)
+    }
+
+    /// Whether the picture shows the light that arrives, whatever the surface makes of it.
+    pub fn is_of_white(self) -> bool {
+        matches!(self, Self::Light | Self::FalseColor)
     }
 
     /// The next mode in the order of [`Mode::ALL`], around the end.
@@ -75,7 +89,8 @@ impl fmt::Display for Mode {
 /// A name that no mode has.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "no mode is called “{0}”: use shaded, gouraud, ids, barycentrics, elements, mesh, discontinuities or false-color"
+    "no mode is called “{0}”: use shaded, gouraud, ids, barycentrics, elements, mesh, discontinuities, false-color, light or \
+     split"
 )]
 pub struct UnknownMode(String);
 
@@ -106,7 +121,7 @@ mod tests {
     fn modes_are_numbered_in_order_and_next_goes_round() {
         for (number, mode) in Mode::ALL.into_iter().enumerate() {
             assert_eq!(mode as usize, number);
-            assert_eq!(mode.next(), Mode::ALL[(number + 1) % 8]);
+            assert_eq!(mode.next(), Mode::ALL[(number + 1) % Mode::ALL.len()]);
         }
     }
 }

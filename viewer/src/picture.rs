@@ -1,7 +1,7 @@
 //! What is asked of a picture, and the picture.
 
 use glam::Vec3;
-use scene::{Camera, Exposure};
+use scene::{Camera, Exposure, ToneCurve};
 
 use crate::Mode;
 
@@ -18,6 +18,8 @@ pub struct Frame {
     pub mode: Mode,
     /// How bright it is; none meters it: surfaces that reflect, not the lamps, are brought to middle grey.
     pub exposure: Option<Exposure>,
+    /// How exposed light is brought into what a display shows.
+    pub curve: ToneCurve,
 }
 
 impl Frame {
@@ -35,7 +37,8 @@ pub struct Picture {
     /// Height, pixels.
     pub height: u32,
     /// Linear radiance before exposure, W·sr⁻¹·m⁻², for the modes that show light alone ([`Mode::is_light`]). For the
-    /// others, whose colours are not radiance, the display-linear colour, 0..=1. Zero on back sides and background.
+    /// others, whose colours are not radiance, the display-linear colour, 0..=1. Zero on back sides and background. Empty
+    /// where it was not asked for.
     pub radiance: Vec<Vec3>,
     /// What a display shows, sRGB: light after exposure and tone curve, other colours as they are.
     pub rgb: Vec<[u8; 3]>,

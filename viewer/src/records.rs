@@ -3,11 +3,13 @@
 use bytemuck::{Pod, Zeroable};
 use scene::{Baked, EdgeKind, Interpolant, LineKind, Rgb};
 
-use crate::texture_records::{TexturePlace, texture_words};
+use crate::{
+    id_mesh::IdMesh,
+    texture_records::{TexturePlace, texture_words},
+};
 
-/// One triangle as pass (c) reads it. The coefficients (A, 2B, 2C, D, 2E, F) of its interpolant are multiplied by ρ/π, so
-/// that the quadratic is reflected radiance at once and no material is looked up at a pixel; the clamp at 0
-/// commutes, because ρ ≥ 0. A texture multiplies it at the pixel. Laid out as WGSL does: a vec3 takes 16 bytes, whose last 4 hold a u32.
+/// One triangle as pass (c) reads it. The coefficients (A, 2B, 2C, D, 2E, F) of its interpolant are divided by π, so that the
+/// quadratic is the radiance of a white surface. Laid out as WGSL does: a vec3 takes 16 bytes, whose last 4 hold a u32.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 pub(crate) struct TriangleRecord {
@@ -28,9 +30,12 @@ pub(crate) struct TriangleRecord {
     pub texture_corners: u32,
     pub f: [f32; 3],
     pub padding_f: u32,
+    /// ρ of the material, which its texture multiplies at the pixel; of the polygon where there is none.
+    pub reflectance: [f32; 3],
+    pub padding_reflectance: u32,
     /// Emitted radiance Ke, W·sr⁻¹·m⁻².
     pub emitted: [f32; 3],
-    pub padding: u32,
+    pub padding_emitted: u32,
 }
 
 /// Corner positions of a triangle, metres.
@@ -40,8 +45,10 @@ pub(crate) type Corners = [[f32; 3]; 3];
 pub(crate) struct Records {
     /// Pass (c)'s triangles.
     pub triangles: Vec<TriangleRecord>,
-    /// Passes (a) and (b)'s triangles; the edge overlays of pass (c) read them, too.
+    /// Corners of pass (c)'s triangles.
     pub corners: Vec<Corners>,
+    /// Passes (a) and (b)'s triangles.
+    pub mesh: IdMesh,
     /// Radiance of each leaf element by the solver's constant irradiance, W·sr⁻¹·m⁻²; the fourth number is padding.
     pub elements: Vec<[f32; 4]>,
     /// Textures, as [`texture_words`] has them; empty where there are none.
@@ -61,8 +68,7 @@ impl Records {
             let reflectance =
                 if is_textured { material.reflectance } else { baked.scene.reflectance(triangle.polygon) };
             let Interpolant(coefficients) = baked.interpolant(id);
-            let [a, b2, c2, d, e2, f] =
-                coefficients.map(|c| (c * reflectance / std::f64::consts::PI).as_vec3().to_array());
+            let [a, b2, c2, d, e2, f] = coefficients.map(|c| (c / std::f64::consts::PI).as_vec3().to_array());
             let [e0, e1, e2_] = triangle.edges.map(|edge| edge_code(baked, edge, weights));
             TriangleRecord {
                 a,
@@ -76,6 +82,7 @@ impl Records {
                 texture_size: place.size,
                 texture_corners: place.corners,
                 edges: e0 | e1 << 10 | e2_ << 20,
+                reflectance: reflectance.as_vec3().to_array(),
                 emitted: material.radiance.as_vec3().to_array(),
                 ..TriangleRecord::zeroed()
             }
@@ -91,6 +98,7 @@ impl Records {
         Self {
             triangles: ids.clone().map(triangle).collect(),
             corners: ids.map(|id| baked.corners(id).map(|corner| corner.as_vec3().to_array())).collect(),
+            mesh: IdMesh::of(baked),
             elements: baked.elements.iter().map(element).collect(),
             textures,
         }
@@ -163,7 +171,7 @@ mod tests {
         assert!(records.triangles.is_empty() && records.corners.is_empty() && records.elements.is_empty());
     }
 
-    /// The folded coefficients against the bake's own evaluation.
+    /// The record against the bake's own evaluation.
     #[test]
     fn the_record_gives_the_radiance_of_the_bake() {
         let baked = room();

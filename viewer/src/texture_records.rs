@@ -51,24 +51,46 @@ pub(crate) fn texture_words(baked: &Baked) -> (Vec<u32>, Vec<TexturePlace>) {
 
 /// The linear colour of a triangle's texture at barycentrics (s, t), bilinear and repeated; 1 without one. The shader's
 /// `texture_colour`, operation for operation.
+#[inline]
 pub(crate) fn texture_colour(words: &[u32], place: TexturePlace, s: f32, t: f32) -> Vec3 {
     if place.texels == 0 {
         return Vec3::ONE;
     }
     let word = |index: u32| f32::from_bits(words[index as usize]);
     let corner = |i: u32| Vec2::new(word(place.corners + 2 * i), word(place.corners + 2 * i + 1));
-    let uv = corner(0) + (corner(1) - corner(0)) * s + (corner(2) - corner(0)) * t;
+    let a = corner(0);
+    let uv = a + (corner(1) - a) * s + (corner(2) - a) * t;
     let (width, height) = ((place.size & 0xffff) as i32, (place.size >> 16) as i32);
-    let at = (uv - uv.floor()) * Vec2::new(width as f32, height as f32) - 0.5;
-    let part = at - at.floor();
-    let (x, y) = (at.x.floor() as i32, at.y.floor() as i32);
-    let texel = |dx: i32, dy: i32| {
-        let (column, row) = ((x + dx + width) % width, (y + dy + height) % height);
-        let [r, g, b, _] = words[place.texels as usize + (row * width + column) as usize].to_le_bytes();
-        Vec3::new(word(r.into()), word(g.into()), word(b.into()))
+    let (x, x_part) = whole_and_part((uv.x - whole_and_part(uv.x).0 as f32) * width as f32 - 0.5);
+    let (y, y_part) = whole_and_part((uv.y - whole_and_part(uv.y).0 as f32) * height as f32 - 0.5);
+    // From -1 to the size, and repeated: a division would take longer than all else.
+    let wrapped = |at: i32, size: i32| {
+        if at < 0 {
+            at + size
+        } else if at < size {
+            at
+        } else {
+            at - size
+        }
     };
-    let mix = |a: Vec3, b: Vec3, part: f32| a * (1.0 - part) + b * part;
-    mix(mix(texel(0, 0), texel(1, 0), part.x), mix(texel(0, 1), texel(1, 1), part.x), part.y)
+    let columns = [wrapped(x, width), wrapped(x + 1, width)];
+    let row = |y: i32| {
+        let first = place.texels as usize + (wrapped(y, height) * width) as usize;
+        let texel = |column: i32| {
+            let [r, g, b, _] = words[first + column as usize].to_le_bytes();
+            Vec3::new(word(r.into()), word(g.into()), word(b.into()))
+        };
+        texel(columns[0]) * (1.0 - x_part) + texel(columns[1]) * x_part
+    };
+    row(y) * (1.0 - y_part) + row(y + 1) * y_part
+}
+
+/// The next whole number down, and what is above it: `floor` is a call where a processor need not have it.
+#[inline]
+fn whole_and_part(x: f32) -> (i32, f32) {
+    let towards_0 = x as i32;
+    let whole = towards_0 - i32::from(towards_0 as f32 > x);
+    (whole, x - whole as f32)
 }
 
 #[cfg(test)]

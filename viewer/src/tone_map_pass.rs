@@ -1,7 +1,7 @@
 //! Pass (d): exposure, tone curve and sRGB (Hardt & Teller 1996, section 2.7, copied pixels as they were).
-//! [`scene::Exposure`], [`scene::tone_curve`] and [`scene::encode_srgb`] say the same on the CPU.
+//! [`scene::Exposure`], [`scene::ToneCurve`] and [`scene::encode_srgb`] say the same on the CPU.
 
-use crate::{frame::Targets, gpu::bind_group};
+use crate::gpu::bind_group;
 
 /// Source of the shader.
 pub(crate) const SHADER: &str = concat!(include_str!("shaders/frame.wgsl"), include_str!("shaders/tone_map_pass.wgsl"));
@@ -12,7 +12,9 @@ pub(crate) struct ToneMapPass {
 }
 
 impl ToneMapPass {
-    pub fn new(device: &wgpu::Device, output: wgpu::TextureFormat) -> Self {
+    /// The pass. In a window nothing shines through; in a picture alpha is 0 where nothing was hit.
+    pub fn new(device: &wgpu::Device, output: wgpu::TextureFormat, is_window: bool) -> Self {
+        let write_mask = if is_window { wgpu::ColorWrites::COLOR } else { wgpu::ColorWrites::ALL };
         let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
             label: Some("tone map"),
             source: wgpu::ShaderSource::Wgsl(SHADER.into()),
@@ -33,7 +35,7 @@ impl ToneMapPass {
                 module: &module,
                 entry_point: Some("pixel"),
                 compilation_options: Default::default(),
-                targets: &[Some(output.into())],
+                targets: &[Some(wgpu::ColorTargetState { format: output, blend: None, write_mask })],
             }),
             multiview_mask: None,
             cache: None,
@@ -53,7 +55,13 @@ impl ToneMapPass {
     }
 
     /// Writes the picture to an output of the same size.
-    pub fn encode(&self, encoder: &mut wgpu::CommandEncoder, targets: &Targets, output: &wgpu::TextureView) {
+    pub fn encode(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        inputs: &wgpu::BindGroup,
+        output: &wgpu::TextureView,
+        times: Option<wgpu::RenderPassTimestampWrites<'_>>,
+    ) {
         let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             label: Some("tone map"),
             color_attachments: &[Some(wgpu::RenderPassColorAttachment {
@@ -62,10 +70,11 @@ impl ToneMapPass {
                 resolve_target: None,
                 ops: wgpu::Operations { load: wgpu::LoadOp::Clear(wgpu::Color::BLACK), store: wgpu::StoreOp::Store },
             })],
+            timestamp_writes: times,
             ..Default::default()
         });
         pass.set_pipeline(&self.pipeline);
-        pass.set_bind_group(0, &targets.tone_map_inputs, &[]);
+        pass.set_bind_group(0, inputs, &[]);
         pass.draw(0..3, 0..1);
     }
 }

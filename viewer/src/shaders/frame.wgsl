@@ -14,7 +14,8 @@ struct Frame {
     // 1 where the picture is light that the tone map exposes, 0 for a diagram.
     is_light: u32,
     forward: vec3<f32>,
-    padding: u32,
+    // The tone curve, by its number in `scene::ToneCurve`.
+    curve: u32,
     // Pixels.
     size: vec2<f32>,
 }
@@ -22,11 +23,19 @@ struct Frame {
 // Where the tone curve leaves the straight line.
 const SHOULDER: f32 = 0.6;
 
-// Identity up to a shoulder, then an exponential approach to 1 with a continuous slope.
+// The frame's tone curve, as `scene::ToneCurve` has it.
 fn tone_curve(linear: vec3<f32>) -> vec3<f32> {
+    let x = max(linear, vec3(0.0));
+    if frame.curve == 1u {
+        return min(x, vec3(1.0));
+    }
+    if frame.curve == 2u {
+        let y = min(x, vec3(1e3));
+        return min(y * (2.51 * y + 0.03) / (y * (2.43 * y + 0.59) + 0.14), vec3(1.0));
+    }
     let room = 1.0 - SHOULDER;
-    let above = SHOULDER + room * (1.0 - exp(-(linear - SHOULDER) / room));
-    return select(above, max(linear, vec3(0.0)), linear <= vec3(SHOULDER));
+    let above = SHOULDER + room * (1.0 - exp(-(x - SHOULDER) / room));
+    return select(above, x, x <= vec3(SHOULDER));
 }
 
 // The sRGB transfer function (IEC 61966-2-1).

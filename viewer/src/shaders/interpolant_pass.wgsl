@@ -1,7 +1,7 @@
 // Pass (c): the light at every pixel (Hardt & Teller, section 2.6). `twin.rs` says the same in Rust.
 
 struct Triangle {
-    // The coefficients of the interpolant times reflectance / pi: reflected radiance.
+    // The coefficients of the interpolant / pi: the radiance of a white surface.
     a: vec3<f32>,
     element: u32,
     b2: vec3<f32>,
@@ -15,6 +15,7 @@ struct Triangle {
     e2: vec3<f32>,
     texture_corners: u32,
     f: vec3<f32>,
+    reflectance: vec3<f32>,
     emitted: vec3<f32>,
 }
 
@@ -42,6 +43,8 @@ const ELEMENTS = 4u;
 const MESH = 5u;
 const DISCONTINUITIES = 6u;
 const FALSE_COLOR = 7u;
+const LIGHT = 8u;
+const SPLIT = 9u;
 
 @compute @workgroup_size(8, 8)
 fn interpolate(@builtin(global_invocation_id) id: vec3<u32>) {
@@ -49,18 +52,37 @@ fn interpolate(@builtin(global_invocation_id) id: vec3<u32>) {
     if any(vec2<f32>(pixel) >= frame.size) {
         return;
     }
-    let seen = textureLoad(visibility, pixel, 0).xy;
+    let seen = textureLoad(visibility, pixel, 0).x;
     var colour = vec3(0.0);
     // Back sides are black.
-    if seen.x != 0u && seen.x < 0x80000000u {
-        colour = colour_at(seen.x - 1u, unpack2x16unorm(seen.y), vec2<f32>(pixel) + 0.5);
+    if seen != 0u && seen < 0x80000000u {
+        let place = vec2<f32>(pixel) + 0.5;
+        colour = colour_at(seen - 1u, place);
     }
-    textureStore(picture, pixel, vec4(colour, f32(seen.x != 0u)));
+    textureStore(picture, pixel, vec4(colour, f32(seen != 0u)));
 }
 
-fn colour_at(id: u32, st: vec2<f32>, pixel: vec2<f32>) -> vec3<f32> {
-    if MODE == GOURAUD {
-        return gouraud(id, st.x, st.y);
+// Where the ray through a pixel meets the plane of a triangle that faces the eye (Moeller and Trumbore 1997).
+fn barycentrics(id: u32, pixel: vec2<f32>) -> vec2<f32> {
+    let a = position(3u * id);
+    let ab = position(3u * id + 1u) - a;
+    let ac = position(3u * id + 2u) - a;
+    let eye = frame.eye - a;
+    let x = pixel.x - 0.5 * frame.size.x;
+    let y = 0.5 * frame.size.y - pixel.y;
+    let ray = frame.right * x + frame.up * y + frame.forward * frame.focal;
+    return vec2(dot(cross(ac, eye), ray), dot(cross(eye, ab), ray)) / max(dot(cross(ac, ab), ray), 1e-30);
+}
+
+// A corner of a triangle, metres.
+fn position(index: u32) -> vec3<f32> {
+    return vec3(corners[3u * index], corners[3u * index + 1u], corners[3u * index + 2u]);
+}
+
+fn colour_at(id: u32, pixel: vec2<f32>) -> vec3<f32> {
+    let st = clamp(barycentrics(id, pixel), vec2(0.0), vec2(1.0));
+    if MODE == GOURAUD || MODE == SPLIT && pixel.x < 0.5 * frame.size.x {
+        return gouraud(id, st);
     } else if MODE == IDS {
         return id_colour(id);
     } else if MODE == BARYCENTRICS {
@@ -68,30 +90,37 @@ fn colour_at(id: u32, st: vec2<f32>, pixel: vec2<f32>) -> vec3<f32> {
     } else if MODE == ELEMENTS {
         return overlay(tone_curve(elements[triangles[id].element].rgb * frame.exposure), id, pixel);
     } else if MODE == MESH {
-        return overlay(tone_curve(interpolant(id, st.x, st.y) * frame.exposure), id, pixel);
+        return overlay(tone_curve(interpolant(id, st) * frame.exposure), id, pixel);
     } else if MODE == DISCONTINUITIES {
-        return overlay(0.35 * tone_curve(interpolant(id, st.x, st.y) * frame.exposure), id, pixel);
+        return overlay(0.35 * tone_curve(interpolant(id, st) * frame.exposure), id, pixel);
     } else if MODE == FALSE_COLOR {
-        return false_color(interpolant(id, st.x, st.y));
+        return false_color(id, st, pixel);
+    } else if MODE == LIGHT {
+        return light(id, st) + triangles[id].emitted;
     }
-    return interpolant(id, st.x, st.y);
+    return interpolant(id, st);
 }
 
-// A s^2 + 2B st + 2C s + D t^2 + 2E t + F, clamped at 0, and what the surface emits.
-fn interpolant(id: u32, s: f32, t: f32) -> vec3<f32> {
-    let reflected = (triangles[id].a * s + triangles[id].b2 * t + triangles[id].c2) * s
-        + (triangles[id].d * t + triangles[id].e2) * t + triangles[id].f;
-    return max(reflected, vec3(0.0)) * texture_colour(id, s, t) + triangles[id].emitted;
+// The radiance of a white surface: A s^2 + 2B st + 2C s + D t^2 + 2E t + F, clamped at 0.
+fn light(id: u32, st: vec2<f32>) -> vec3<f32> {
+    let quadratic = (triangles[id].a * st.x + triangles[id].b2 * st.y + triangles[id].c2) * st.x
+        + (triangles[id].d * st.y + triangles[id].e2) * st.y + triangles[id].f;
+    return max(quadratic, vec3(0.0));
+}
+
+// What the surface makes of the light, and what it emits.
+fn interpolant(id: u32, st: vec2<f32>) -> vec3<f32> {
+    return light(id, st) * triangles[id].reflectance * texture_colour(id, st) + triangles[id].emitted;
 }
 
 // Linear between the values at the corners: F, A + 2C + F and D + 2E + F.
-fn gouraud(id: u32, s: f32, t: f32) -> vec3<f32> {
-    let reflected = (triangles[id].a + triangles[id].c2) * s + (triangles[id].d + triangles[id].e2) * t + triangles[id].f;
-    return max(reflected, vec3(0.0)) * texture_colour(id, s, t) + triangles[id].emitted;
+fn gouraud(id: u32, st: vec2<f32>) -> vec3<f32> {
+    let linear = (triangles[id].a + triangles[id].c2) * st.x + (triangles[id].d + triangles[id].e2) * st.y + triangles[id].f;
+    return max(linear, vec3(0.0)) * triangles[id].reflectance * texture_colour(id, st) + triangles[id].emitted;
 }
 
 // The linear colour of the triangle's texture, bilinear and repeated; 1 without one.
-fn texture_colour(id: u32, s: f32, t: f32) -> vec3<f32> {
+fn texture_colour(id: u32, st: vec2<f32>) -> vec3<f32> {
     if !TEXTURED {
         return vec3(1.0);
     }
@@ -101,7 +130,7 @@ fn texture_colour(id: u32, s: f32, t: f32) -> vec3<f32> {
     }
     let corners = triangles[id].texture_corners;
     let a = texture_corner(corners);
-    let uv = a + (texture_corner(corners + 2u) - a) * s + (texture_corner(corners + 4u) - a) * t;
+    let uv = a + (texture_corner(corners + 2u) - a) * st.x + (texture_corner(corners + 4u) - a) * st.y;
     let size = vec2<i32>(i32(triangles[id].texture_size & 0xffffu), i32(triangles[id].texture_size >> 16u));
     let place = (uv - floor(uv)) * vec2<f32>(size) - 0.5;
     let part = place - floor(place);
@@ -117,7 +146,8 @@ fn texture_corner(word: u32) -> vec2<f32> {
 
 // A texel in linear light; columns and rows from -1 to the size repeat.
 fn texel(texels: u32, size: vec2<i32>, place: vec2<i32>) -> vec3<f32> {
-    let inside = (place + size) % size;
+    let above = select(place, place - size, place >= size);
+    let inside = select(above, above + size, above < vec2(0));
     let colour = textures[texels + u32(inside.y * size.x + inside.x)];
     let values = vec3(textures[colour & 255u], textures[(colour >> 8u) & 255u], textures[(colour >> 16u) & 255u]);
     return bitcast<vec3<f32>>(values);
@@ -132,13 +162,33 @@ fn id_colour(id: u32) -> vec3<f32> {
     return 0.04 + 0.96 * vec3<f32>(vec3(hash, hash >> 8u, hash >> 16u) & vec3(255u)) / 255.0;
 }
 
-// Ten stops around middle grey on a ramp of even lightness.
-fn false_color(radiance: vec3<f32>) -> vec3<f32> {
-    let luminance = dot(radiance, vec3(0.2126, 0.7152, 0.0722)) * frame.exposure;
-    let place = clamp(log2(max(luminance, 1e-30) / 0.18) / 10.0 + 0.5, 0.0, 1.0) * 9.0;
-    let index = min(u32(place), 8u);
-    return mix(RAMP[index], RAMP[index + 1u], place - f32(index));
+// Illuminance: ten stops around middle grey on a ramp of even lightness, with lines at 1, 2 and 5 times powers of ten lux.
+fn false_color(id: u32, st: vec2<f32>, pixel: vec2<f32>) -> vec3<f32> {
+    let here = luminance(id, st);
+    let place = clamp(log2(here * frame.exposure / 0.18) / 10.0 + 0.5, 0.0, 1.0);
+    let part = place * 9.0;
+    let index = min(u32(part), 8u);
+    let colour = mix(RAMP[index], RAMP[index + 1u], part - f32(index));
+    // Change of the logarithm from pixel to pixel.
+    let right = luminance(id, barycentrics(id, pixel + vec2(1.0, 0.0)));
+    let below = luminance(id, barycentrics(id, pixel + vec2(0.0, 1.0)));
+    let change = length(log(vec2(right, below) / here));
+    let lux = LUX * here;
+    let digits = lux / pow(10.0, floor(log(lux) / log(10.0)));
+    let away = abs(log(vec4(digits) / vec4(1.0, 2.0, 5.0, 10.0)));
+    let pixels = min(min(away.x, away.y), min(away.z, away.w)) / max(change, 1e-6);
+    // Where lines would be denser than pixels there are none.
+    let coverage = clamp(1.1 - pixels, 0.0, 1.0) * clamp(2.0 - change / 0.35, 0.0, 1.0);
+    return mix(colour, vec3(select(0.0, 1.0, place < 0.4)), 0.7 * coverage);
 }
+
+// Luminance of a white surface, W / (sr m^2), above the darkest that has a logarithm.
+fn luminance(id: u32, st: vec2<f32>) -> f32 {
+    return max(dot(light(id, st), vec3(0.2126, 0.7152, 0.0722)), 1e-30);
+}
+
+// Lux by the luminance of a white surface: pi times the luminous efficacy, `scene::LUMINOUS_EFFICACY`.
+const LUX = 3.14159265 * 179.0;
 
 // The colour map "inferno" of matplotlib at ten places, display-linear.
 const RAMP = array(
@@ -203,6 +253,6 @@ fn line_distance(from_corner: vec3<f32>, to_corner: vec3<f32>, place: vec3<f32>)
 
 // A corner of a triangle in the camera's axes, metres.
 fn corner(index: u32) -> vec3<f32> {
-    let p = vec3(corners[3u * index], corners[3u * index + 1u], corners[3u * index + 2u]) - frame.eye;
+    let p = position(index) - frame.eye;
     return vec3(dot(p, frame.right), dot(p, frame.up), dot(p, frame.forward));
 }

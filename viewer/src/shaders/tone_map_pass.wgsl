@@ -11,7 +11,7 @@ fn corner(@builtin(vertex_index) index: u32) -> @builtin(position) vec4<f32> {
 
 @fragment
 fn pixel(@builtin(position) position: vec4<f32>) -> @location(0) vec4<f32> {
-    let colour = textureLoad(picture, vec2<u32>(position.xy), 0).rgb;
-    let shown = select(colour, tone_curve(colour * frame.exposure), frame.is_light == 1u);
-    return vec4(encode_srgb(shown), 1.0);
+    let colour = textureLoad(picture, vec2<u32>(position.xy), 0);
+    let shown = select(colour.rgb, tone_curve(colour.rgb * frame.exposure), frame.is_light == 1u);
+    return vec4(encode_srgb(shown), colour.a);
 }

@@ -1,28 +1,23 @@
-// Passes (a) and (b): which triangle is seen at a pixel, and where on it (Hardt & Teller, sections 2.4 and 2.5).
+// Passes (a) and (b): which triangle is seen at a pixel (Hardt & Teller, sections 2.4 and 2.5).
 //
-// What the paper got from a 256 x 256 texture of its own coordinates is a perspective-correct vertex attribute here.
+// Where on it, whoever evaluates the pixel finds out.
 
 @group(0) @binding(0) var<uniform> frame: Frame;
 
 struct Corner {
     @invariant @builtin(position) clip: vec4<f32>,
-    @location(0) @interpolate(flat, either) triangle: u32,
-    @location(1) @interpolate(perspective, center) barycentrics: vec2<f32>,
+    // That of the triangle's first corner.
+    @location(0) @interpolate(flat) triangle: u32,
 }
 
 @vertex
-fn corner(@builtin(vertex_index) index: u32, @location(0) position: vec3<f32>) -> Corner {
-    let number = index % 3u;
-    var out: Corner;
+fn corner(@location(0) position: vec3<f32>, @location(1) triangle: u32) -> Corner {
     // Relative to the eye first, so that the rounding of a far origin does not reach the picture.
-    out.clip = frame.clip_from_eye * vec4(position - frame.eye, 1.0);
-    out.triangle = index / 3u;
-    out.barycentrics = vec2(f32(number == 1u), f32(number == 2u));
-    return out;
+    return Corner(frame.clip_from_eye * vec4(position - frame.eye, 1.0), triangle);
 }
 
-// The triangle's id plus one, the top bit set on back sides; and the barycentrics, 16 bits each.
+// The triangle's id plus one, the top bit set on back sides.
 @fragment
-fn pixel(in: Corner, @builtin(front_facing) front: bool) -> @location(0) vec2<u32> {
-    return vec2(in.triangle + select(0x80000001u, 1u, front), pack2x16unorm(in.barycentrics));
+fn pixel(in: Corner, @builtin(front_facing) front: bool) -> @location(0) u32 {
+    return in.triangle + select(0x80000001u, 1u, front);
 }
