@@ -18,9 +18,9 @@ use point_gather::PointGather;
 use rayon::prelude::*;
 use renderer::{
     AdaptiveOptions, AdaptiveSampler, Evaluation, Evaluator, Eye, Film, Filter, Interval, Rule, Sight, SurfacePoint,
-    UniformSampler, Whitted, sample_histogram, shown,
+    UniformSampler, Whitted, sample_histogram,
 };
-use scene::{Bvh, Camera, Exposure, Gloss, Light, Material, Rgb, Scene};
+use scene::{Bvh, Camera, Display, Exposure, Gloss, Light, Material, Rgb, Scene, ToneCurve};
 use solver::{Gather, SolveOptions};
 
 /// The paper's confidence.
@@ -59,7 +59,7 @@ struct View {
     name: &'static str,
     scene: Scene,
     camera: Camera,
-    exposure: Exposure,
+    display: Display,
     /// What the light of a point is multiplied by: a solid texture.
     texture: Option<fn(DVec3) -> f64>,
 }
@@ -73,7 +73,7 @@ impl View {
     fn of_file(name: &'static str, path: &Path, ev: f32) -> Self {
         let scene = formats::read_scene(path).unwrap().scene;
         let camera = scene.cameras[0].camera;
-        Self { name, scene, camera, exposure: Exposure { ev }, texture: None }
+        Self { name, scene, camera, display: display(ev), texture: None }
     }
 
     /// Has `work` look at the scene with Whitted's rays, in a square picture of a side of so many pixels.
@@ -100,6 +100,11 @@ impl View {
     }
 }
 
+/// A display with an exposure value and the usual tone curve.
+fn display(ev: f32) -> Display {
+    Display::new(Exposure { ev }, ToneCurve::default())
+}
+
 /// The teapot on a table, under a light that is far away and one at a point: as it is, and with normals at its vertices.
 fn teapots() -> Vec<View> {
     let Some(path) = std::env::var_os("HALFLIGHT_TEAPOT").map(PathBuf::from) else {
@@ -119,13 +124,8 @@ fn teapots() -> Vec<View> {
     round.shading_normals = round.corners.iter().map(|&v| normals[v as usize].normalize_or_zero().as_vec3()).collect();
     let camera =
         Camera { eye: DVec3::new(1.5, -9.0, 5.0), target: DVec3::new(0.2, 0.0, 1.3), up: DVec3::Z, vertical_fov: 0.75 };
-    let view = |name, scene: &Scene, texture| View {
-        name,
-        scene: scene.clone(),
-        camera,
-        exposure: Exposure { ev: 0.0 },
-        texture,
-    };
+    let view =
+        |name, scene: &Scene, texture| View { name, scene: scene.clone(), camera, display: display(0.0), texture };
     vec![
         view("teapot", &flat, None),
         view("teapot with normals", &round, None),
@@ -189,7 +189,7 @@ fn truth(view: &View, side: u32) -> Vec<Vec3> {
             let corner = DVec2::new(f64::from(pixel % side), f64::from(pixel / side));
             let (mut sum, mut low, mut high) = (DVec3::ZERO, Vec3::INFINITY, Vec3::NEG_INFINITY);
             for i in 0..points * points {
-                let seen = shown(evaluate(corner + place(i)).radiance, view.exposure.factor());
+                let seen = view.display.light(evaluate(corner + place(i)).radiance);
                 (low, high) = (low.min(seen), high.max(seen));
                 sum += seen.as_dvec3();
             }
@@ -223,10 +223,10 @@ struct Made {
 }
 
 /// Makes a picture until it is complete or has so many samples.
-fn adaptive(evaluate: &Evaluator<'_>, side: u32, exposure: Exposure, rule: Rule, most: usize, filter: Filter) -> Made {
-    let options = AdaptiveOptions { seed: 1, rule, level: LEVEL, interval: Interval::Linear(INTERVAL), exposure };
+fn adaptive(evaluate: &Evaluator<'_>, side: u32, display: Display, rule: Rule, most: usize, filter: Filter) -> Made {
+    let options = AdaptiveOptions { seed: 1, rule, level: LEVEL, interval: Interval::Linear(INTERVAL), display };
     let mut sampler = AdaptiveSampler::new(side, side, &options, evaluate).unwrap();
-    let mut film = Film::new(side, side, filter, Some(exposure));
+    let mut film = Film::new(side, side, filter, Some(display));
     film.add(&sampler.tiles());
     let mut seconds = [0.0; 3];
     loop {
@@ -291,8 +291,8 @@ fn tables() {
                 let pixels = f64::from(side * side);
                 let (made, means) = one.install(|| {
                     view.look(*side, |evaluate| {
-                        let made = adaptive(evaluate, *side, view.exposure, rule, usize::MAX, Filter::Lanczos);
-                        let mut film = Film::new(*side, *side, Filter::Box, Some(view.exposure));
+                        let made = adaptive(evaluate, *side, view.display, rule, usize::MAX, Filter::Lanczos);
+                        let mut film = Film::new(*side, *side, Filter::Box, Some(view.display));
                         film.add(&made.sampler.tiles());
                         (made, film.picture())
                     })
@@ -341,12 +341,12 @@ fn uniform() {
             let pixels = f64::from(COMPARED * COMPARED);
             for a_pixel in [0.1, 0.25, 0.5, 1.0, 1.5, f64::INFINITY] {
                 let most = (a_pixel * pixels) as usize;
-                let made = adaptive(evaluate, COMPARED, view.exposure, Rule::Calibrated, most, Filter::Box);
+                let made = adaptive(evaluate, COMPARED, view.display, Rule::Calibrated, most, Filter::Box);
                 let a_pixel = made.sampler.samples() as f64 / pixels;
                 let mut even = UniformSampler::new(COMPARED, COMPARED, a_pixel, 1).unwrap();
                 let batch = even.next_batch(usize::MAX);
                 let seen: Vec<Evaluation> = batch.par_iter().map(|&point| evaluate(point)).collect();
-                let mut film = Film::new(COMPARED, COMPARED, Filter::Box, Some(view.exposure));
+                let mut film = Film::new(COMPARED, COMPARED, Filter::Box, Some(view.display));
                 film.add(&even.take(&seen));
                 let [ours, theirs] = [&made.picture, &film.picture()].map(|picture| rmse(picture, &truth));
                 println!("| {} | {a_pixel:.2} | {ours:.5} | {theirs:.5} | {:.1} |", view.name, theirs / ours);
@@ -376,11 +376,11 @@ fn speed() {
     let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
     one.install(|| {
         for (rule, name) in [(Rule::Paper, "the paper's"), (Rule::Calibrated, "calibrated")] {
-            let made = adaptive(&evaluate, 512, Exposure { ev: 0.0 }, rule, usize::MAX, Filter::Lanczos);
+            let made = adaptive(&evaluate, 512, display(0.0), rule, usize::MAX, Filter::Lanczos);
             let samples = made.sampler.samples() as f64;
             let [generate, _, reconstruct] = made.seconds.map(|seconds| seconds * 1e9 / samples);
             let (mut anew, mut asked) = (0.0, 0.0);
-            let mut film = Film::new(512, 512, Filter::Lanczos, Some(Exposure { ev: 0.0 }));
+            let mut film = Film::new(512, 512, Filter::Lanczos, Some(display(0.0)));
             timed(&mut anew, || film.add(&made.sampler.tiles()));
             timed(&mut asked, || film.picture());
             println!(

@@ -64,7 +64,7 @@ pub fn with_evaluator<T>(
             require_light(&flags.input, &scene)?;
             // From the bake: its reflectors send what the bake says that they do.
             let light = made.map_or(asked, |made| as_baked(&made, &asked));
-            let solution = pipeline::bake(&scene, &light).solution;
+            let solution = pipeline::bake(&scene, &light, None).solution;
             let gather = Gather::new(&scene, &solution);
             let points = PointGather::new(&scene, &solution, &gather);
             view(&scene, flags, |eye| work(&|point| eye.diffuse(point, |seen| (points.irradiance(seen), 0))))
@@ -88,7 +88,7 @@ fn whitted<T>(scene: &Scene, flags: &RenderFlags, work: impl FnOnce(&Evaluator<'
          file, or add a [[light]] in a scene file",
         flags.input.display()
     );
-    let (solution, _) = pipeline::solve(scene, &LightFlags { bounces: Some(0), ..LightFlags::default() });
+    let (solution, _) = pipeline::solve(scene, &LightFlags { bounces: Some(0), ..LightFlags::default() }, None);
     let gather = Gather::new(scene, &solution);
     let points = PointGather::new(scene, &solution, &gather);
     let direct = |point: &SurfacePoint| points.irradiance(point);

@@ -11,7 +11,7 @@ use renderer::{
     AdaptiveOptions, AdaptiveSampler, Evaluation, Evaluator, Film, ScatteredFilm, Surface, Tile, UniformSampler,
     sample_histogram, sample_map,
 };
-use scene::{Exposure, encode_srgb, luminance};
+use scene::{Display, Exposure, encode_srgb, luminance};
 use serde::Serialize;
 
 use crate::args::{Budget, ExposureChoice, ImageKind, Interpolation, RenderFlags, SamplerChoice};
@@ -146,14 +146,14 @@ enum Reconstruction {
 }
 
 impl Reconstruction {
-    fn new(flags: &RenderFlags, exposure: Option<Exposure>) -> Self {
+    fn new(flags: &RenderFlags, display: Option<Display>) -> Self {
         let ((width, height), filter) = (flags.size, flags.filter.into());
         let surface = match flags.interpolation {
-            Interpolation::Constant => return Self::Cells(Film::new(width, height, filter, exposure)),
+            Interpolation::Constant => return Self::Cells(Film::new(width, height, filter, display)),
             Interpolation::Planar => Surface::Planar,
             Interpolation::Smooth => Surface::Smooth,
         };
-        Self::Triangles(ScatteredFilm::new(width, height, filter, exposure), surface)
+        Self::Triangles(ScatteredFilm::new(width, height, filter, display), surface)
     }
 
     /// Adds what was seen at points, and the cells that changed by it.
@@ -192,7 +192,8 @@ impl Picture {
     fn new(flags: &RenderFlags, exposure: Exposure, limit: &Limit, evaluate: &Evaluator<'_>) -> Result<Self> {
         let (width, height) = flags.size;
         let is_exr = ImageKind::of(&flags.output) == Some(ImageKind::Exr);
-        let mut film = Reconstruction::new(flags, (!is_exr).then_some(exposure));
+        let display = Display::new(exposure, flags.tone_curve);
+        let mut film = Reconstruction::new(flags, (!is_exr).then_some(display));
         let sampler = match flags.sampler {
             SamplerChoice::Adaptive => {
                 let options = AdaptiveOptions {
@@ -200,7 +201,7 @@ impl Picture {
                     rule: flags.confidence.rule.into(),
                     level: flags.confidence.level,
                     interval: flags.confidence.interval(),
-                    exposure,
+                    display,
                 };
                 let sampler = AdaptiveSampler::new(width, height, &options, evaluate);
                 sampler.map(|sampler| Sampler::Adaptive(Box::new(sampler)))

@@ -26,6 +26,7 @@ mod parity;
 mod readme;
 mod real_scenes;
 mod reference;
+mod render;
 mod robustness;
 mod smooth_shading;
 mod textures;

@@ -16,7 +16,7 @@
 //! - Beside the paper's rule for the variance of a mean there is one that keeps what it says ([`Rule`]).
 
 use glam::{DVec2, Vec3};
-use scene::Exposure;
+use scene::Display;
 
 use crate::cell::{Cell, Halves, MOST_PIXELS, pixels};
 use crate::confidence::{Confidence, Interval};
@@ -50,8 +50,8 @@ pub struct AdaptiveOptions {
     pub level: f64,
     /// How far from the truth a pixel's mean may be.
     pub interval: Interval,
-    /// How bright the picture is made: samples are compared as a display shows them.
-    pub exposure: Exposure,
+    /// Samples are compared as it shows them.
+    pub display: Display,
 }
 
 /// Samples of a picture, and where the next ones go.
@@ -106,7 +106,7 @@ impl AdaptiveSampler {
             seed: options.seed,
             rule: options.rule,
             confidence: Confidence::new(options.level, options.interval),
-            tree: KdTree::new(size, options.exposure, place, first),
+            tree: KdTree::new(size, options.display, place, first),
             batch: Vec::new(),
             closed: 0,
             excluded: u64::from(!is_number),
@@ -287,15 +287,22 @@ fn keep_largest(open: &mut Vec<(f32, Slot, Cell)>, most: usize, seed: u64) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Film, Filter, shown};
+    use crate::{Film, Filter};
+    use scene::{Exposure, ToneCurve};
 
-    const OPTIONS: AdaptiveOptions = AdaptiveOptions {
-        seed: 1,
-        rule: Rule::Calibrated,
-        level: 0.99,
-        interval: Interval::Linear(1.0 / 255.0),
-        exposure: Exposure { ev: 0.0 },
-    };
+    fn display() -> Display {
+        Display::new(Exposure { ev: 0.0 }, ToneCurve::Shoulder)
+    }
+
+    fn usual() -> AdaptiveOptions {
+        AdaptiveOptions {
+            seed: 1,
+            rule: Rule::Calibrated,
+            level: 0.99,
+            interval: Interval::Linear(1.0 / 255.0),
+            display: display(),
+        }
+    }
 
     /// A bright disk of 13.5 pixels about (20, 15) on a ground whose brightness rises to the right.
     fn disk(point: DVec2) -> Evaluation {
@@ -321,19 +328,19 @@ mod tests {
     fn truth(pixel: usize, width: u32) -> Vec3 {
         let corner = DVec2::new((pixel % width as usize) as f64, (pixel / width as usize) as f64);
         let place = |i: u32| corner + (DVec2::new(f64::from(i % 64), f64::from(i / 64)) + 0.5) / 64.0;
-        (0..4096).map(|i| shown(disk(place(i)).radiance, OPTIONS.exposure.factor())).sum::<Vec3>() / 4096.0
+        (0..4096).map(|i| display().light(disk(place(i)).radiance)).sum::<Vec3>() / 4096.0
     }
 
     #[test]
     fn a_picture_without_pixels_or_with_too_many_is_none() {
         for (width, height) in [(0, 0), (0, 9), (9, 0), (MOST_PIXELS + 1, 1), (u32::MAX, u32::MAX)] {
-            assert!(AdaptiveSampler::new(width, height, &OPTIONS, &disk).is_none());
+            assert!(AdaptiveSampler::new(width, height, &usual(), &disk).is_none());
         }
     }
 
     #[test]
     fn one_pixel_is_a_picture() {
-        let sampler = refined((1, 1), &OPTIONS, 100, &|_| Evaluation { radiance: Vec3::ONE, object: 1, cost: 1 });
+        let sampler = refined((1, 1), &usual(), 100, &|_| Evaluation { radiance: Vec3::ONE, object: 1, cost: 1 });
         assert_eq!((sampler.samples(), sampler.closed_share()), (1, 1.0));
         assert_eq!(
             sampler.tiles(),
@@ -346,7 +353,7 @@ mod tests {
         for size in [(64, 64), (37, 11), (1, 90), (5, 3)] {
             for rule in [Rule::Paper, Rule::Calibrated] {
                 let even = |_: DVec2| Evaluation { radiance: Vec3::splat(0.3), object: 1, cost: 1 };
-                let sampler = refined(size, &AdaptiveOptions { rule, ..OPTIONS }, usize::MAX, &even);
+                let sampler = refined(size, &AdaptiveOptions { rule, ..usual() }, usize::MAX, &even);
                 assert_eq!(sampler.closed_share(), 1.0);
                 assert!(sampler.samples_per_pixel().iter().all(|&count| count == 1), "{size:?}");
             }
@@ -355,9 +362,9 @@ mod tests {
 
     #[test]
     fn samples_gather_at_the_border_and_means_are_right() {
-        let sampler = refined((48, 32), &OPTIONS, usize::MAX, &disk);
+        let sampler = refined((48, 32), &usual(), usize::MAX, &disk);
         assert_eq!(sampler.closed_share(), 1.0);
-        let mut film = Film::new(48, 32, Filter::Box, Some(OPTIONS.exposure));
+        let mut film = Film::new(48, 32, Filter::Box, Some(display()));
         film.add(&sampler.tiles());
         let (counts, picture) = (sampler.samples_per_pixel(), film.picture());
         let mut off = 0;
@@ -375,9 +382,9 @@ mod tests {
     #[test]
     fn a_better_confidence_takes_more_samples_and_is_nearer() {
         let cost_and_error = |level: f64, interval: f64, rule: Rule| {
-            let options = AdaptiveOptions { level, interval: Interval::Linear(interval), rule, ..OPTIONS };
+            let options = AdaptiveOptions { level, interval: Interval::Linear(interval), rule, ..usual() };
             let sampler = refined((48, 32), &options, usize::MAX, &disk);
-            let mut film = Film::new(48, 32, Filter::Box, Some(OPTIONS.exposure));
+            let mut film = Film::new(48, 32, Filter::Box, Some(display()));
             film.add(&sampler.tiles());
             let square = |(pixel, value): (usize, Vec3)| (value - truth(pixel, 48)).length_squared();
             let squares: f32 = film.picture().into_iter().enumerate().map(square).sum();
@@ -396,7 +403,7 @@ mod tests {
     fn the_same_seed_has_the_same_samples_on_any_number_of_threads() {
         let points = |threads: usize, seed: u64| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
-            let options = AdaptiveOptions { seed, ..OPTIONS };
+            let options = AdaptiveOptions { seed, ..usual() };
             pool.install(|| refined((200, 150), &options, 40_000, &disk).points().collect::<Vec<_>>())
         };
         let one = points(1, 7);
@@ -411,7 +418,7 @@ mod tests {
             Evaluation { radiance: Vec3::splat(if lamp { 1000.0 } else { disk(point).radiance.x }), ..disk(point) }
         };
         for filter in [Filter::Lanczos, Filter::Mitchell] {
-            let mut sampler = AdaptiveSampler::new(48, 32, &OPTIONS, &evaluate).expect("the size is one");
+            let mut sampler = AdaptiveSampler::new(48, 32, &usual(), &evaluate).expect("the size is one");
             let (mut running, mut whole) = (Film::new(48, 32, filter, None), Film::new(48, 32, filter, None));
             running.add(&sampler.tiles());
             loop {
@@ -439,12 +446,12 @@ mod tests {
             };
             Evaluation { radiance: Vec3::new(0.3, bad, 0.3), object: 1, cost: 1 }
         };
-        let sampler = refined((32, 32), &OPTIONS, usize::MAX, &holes);
+        let sampler = refined((32, 32), &usual(), usize::MAX, &holes);
         let share = sampler.excluded() as f64 / sampler.samples() as f64;
         assert!((share - 0.1).abs() < 0.03 && sampler.closed_share() == 1.0, "{share}");
         assert!(sampler.points().all(|(_, radiance)| radiance.is_finite()));
         let nothing =
-            refined((8, 8), &OPTIONS, usize::MAX, &|_| Evaluation { radiance: Vec3::NAN, ..holes(DVec2::ONE) });
+            refined((8, 8), &usual(), usize::MAX, &|_| Evaluation { radiance: Vec3::NAN, ..holes(DVec2::ONE) });
         assert_eq!((nothing.excluded(), nothing.samples()), (64, 64));
         assert!(nothing.tiles().iter().all(|tile| tile.radiance == Vec3::ZERO));
     }
@@ -457,7 +464,7 @@ mod tests {
                 radiance: if disk(point).object == 2 { Vec3::splat(bright) } else { Vec3::ZERO },
                 ..disk(point)
             };
-            refined((48, 32), &OPTIONS, usize::MAX, &evaluate).samples()
+            refined((48, 32), &usual(), usize::MAX, &evaluate).samples()
         };
         assert_eq!(lamp(1e3), lamp(1e9));
     }
@@ -465,7 +472,7 @@ mod tests {
     /// Interrupted in the middle of a batch: what was seen counts, and it goes on.
     #[test]
     fn a_part_of_a_batch_may_be_taken() {
-        let mut sampler = AdaptiveSampler::new(48, 32, &OPTIONS, &disk).expect("the size is one");
+        let mut sampler = AdaptiveSampler::new(48, 32, &usual(), &disk).expect("the size is one");
         let mut look = |most: usize| {
             let batch = sampler.next_batch(usize::MAX);
             let seen: Vec<Evaluation> = batch.iter().map(|&point| disk(point)).take(most).collect();

@@ -11,7 +11,7 @@ use std::ops::Range;
 
 use glam::{DVec2, Vec3};
 use rayon::prelude::*;
-use scene::{Exposure, Rgb, tone_curve};
+use scene::{Display, Rgb};
 
 use crate::filter::{Filter, SummedFilter};
 
@@ -24,12 +24,6 @@ pub struct Tile {
     pub radiance: Vec3,
     /// What it had before, if it is a part of a tile that was added already: none where nothing was.
     pub before: Vec3,
-}
-
-/// The light that a display shows of radiance that is multiplied by a factor ([`Exposure::factor`]), before its transfer function:
-/// each channel in 0..=1.
-pub fn shown(radiance: Vec3, factor: f32) -> Vec3 {
-    (radiance * factor).map(tone_curve)
 }
 
 /// Rows of a band, which one thread adds to at a time. Fewer are shared more evenly, and tiles lie in more of them.
@@ -46,8 +40,8 @@ pub struct Film {
     width: usize,
     height: usize,
     filter: SummedFilter,
-    /// What radiance is multiplied by, if the picture is one of what a display shows.
-    factor: Option<f32>,
+    /// If the picture is one of what a display shows.
+    display: Option<Display>,
     /// Tiles of whole pixels, row by row.
     pixels: Vec<Sum>,
     /// Filtered tiles.
@@ -59,8 +53,8 @@ pub struct Film {
 }
 
 impl Film {
-    /// A black picture of so many pixels: of what a display shows with an exposure, or of radiance.
-    pub fn new(width: u32, height: u32, filter: Filter, exposure: Option<Exposure>) -> Self {
+    /// A black picture of so many pixels: of what a display shows, or of radiance.
+    pub fn new(width: u32, height: u32, filter: Filter, display: Option<Display>) -> Self {
         let filter = SummedFilter::new(filter);
         let inside = [width, height].map(|pixels| {
             let share = |i: u32| {
@@ -74,21 +68,12 @@ impl Film {
         let pixel = (-reach..=reach).map(weight).collect();
         let (width, height) = (width as usize, height as usize);
         let black = vec![[0.0; 4]; width * height];
-        Self {
-            width,
-            height,
-            filter,
-            factor: exposure.map(Exposure::factor),
-            pixels: black.clone(),
-            filtered: black,
-            pixel,
-            inside,
-        }
+        Self { width, height, filter, display, pixels: black.clone(), filtered: black, pixel, inside }
     }
 
     /// Adds tiles, on all of rayon's threads. A pixel sums them in their order, whatever the number of threads.
     pub fn add(&mut self, tiles: &[Tile]) {
-        let (filter, size, factor) = (&self.filter, [self.width, self.height], self.factor);
+        let (filter, size, display) = (&self.filter, [self.width, self.height], self.display);
         let mut of_band: Vec<Vec<u32>> = vec![Vec::new(); self.height.div_ceil(BAND)];
         for (number, tile) in (0..).zip(tiles) {
             let reached = reached(filter.radius, self.height, tile.bounds[0].y, tile.bounds[1].y);
@@ -107,14 +92,15 @@ impl Film {
                 let filter = (!is_whole).then_some(filter);
                 across.set(filter, size[0], low.x, high.x);
                 down.set(filter, size[1], low.y, high.y);
-                let light = |radiance| factor.map_or(radiance, |factor| shown(radiance, factor)).as_dvec3();
+                let light = |radiance| display.map_or(radiance, |display| display.light(radiance)).as_dvec3();
                 band.add(light(tile.radiance) - light(tile.before), is_whole, size[0], [&across, &down]);
             }
         });
     }
 
-    /// The picture of what was added so far, row by row: radiance, W·sr⁻¹·m⁻², or what a display shows, above 0. Tiles are to fill the picture; where the filter ends
-    /// beyond it, what lies within counts for the whole. Where a filter overshoots to less than nothing, there is nothing.
+    /// The picture of what was added so far, row by row: radiance, W·sr⁻¹·m⁻², or what a display shows. Tiles are to fill the
+    /// picture; where the filter ends beyond it, what lies within counts for the whole. Where a filter overshoots to less than
+    /// nothing, there is nothing.
     pub fn picture(&self) -> Vec<Vec3> {
         let (width, reach) = (self.width, self.pixel.len() / 2);
         // Across, then down: a pixel's weight is the product of both.
@@ -218,6 +204,7 @@ impl Weights {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use scene::{Exposure, ToneCurve};
 
     const ALL: [Filter; 5] = [Filter::Lanczos, Filter::Box, Filter::Triangle, Filter::Gaussian, Filter::Mitchell];
 
@@ -292,15 +279,15 @@ mod tests {
     /// A lamp's edge in the middle of a pixel is half as bright as white, and has no black rim.
     #[test]
     fn what_a_display_shows_is_filtered_as_it_shows_it() {
-        let exposure = Exposure { ev: 1.0 };
-        let lamp = |filter: Filter, exposure: Option<Exposure>| {
-            let mut film = Film::new(20, 13, filter, exposure);
+        let display = Display::new(Exposure { ev: 1.0 }, ToneCurve::Shoulder);
+        let lamp = |filter: Filter, display: Option<Display>| {
+            let mut film = Film::new(20, 13, filter, display);
             film.add(&[tile((0.0, 0.0), (10.5, 13.0), 0.1), tile((10.5, 0.0), (20.0, 13.0), 1e4)]);
             film.picture()[6 * 20 + 8..6 * 20 + 14].iter().map(|pixel| pixel.x).collect::<Vec<f32>>()
         };
-        let on_display = lamp(Filter::Box, Some(exposure));
+        let on_display = lamp(Filter::Box, Some(display));
         assert!((on_display[1] - 0.2).abs() < 1e-6 && (on_display[2] - 0.6).abs() < 1e-6 && on_display[3] > 0.999);
-        assert!(lamp(Filter::Lanczos, Some(exposure)).iter().all(|&light| light > 0.1));
+        assert!(lamp(Filter::Lanczos, Some(display)).iter().all(|&light| light > 0.1));
         assert!(lamp(Filter::Lanczos, None).contains(&0.0), "by radiance it has the rim");
     }
 

@@ -5,13 +5,12 @@
 //! these comes the external variance, and below the pixel level the variance of a mean and the number of samples. So a node
 //! needs 28 bytes and a sample 36.
 //!
-//! Means are of what a display shows ([`shown`]), as the paper's are: a lamp's edge is no harder to know for being brighter than white.
+//! Means are of what a display shows ([`Display`]), as the paper's are: a lamp's edge is no harder to know for being brighter than white.
 
 use glam::{Vec3, Vec3A};
-use scene::Exposure;
+use scene::Display;
 
 use crate::cell::{Cell, Halves, PIXEL};
-use crate::film::shown;
 
 /// A child of a node: another node, or a leaf, whose number is that of its sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -176,8 +175,7 @@ impl Spread {
 pub(crate) struct KdTree {
     /// Columns and rows of the picture.
     size: [u32; 2],
-    /// What radiance is multiplied by to be shown.
-    factor: f32,
+    display: Display,
     nodes: Vec<Node>,
     samples: Vec<Sample>,
     /// What a display shows of nodes and samples in turn: the mean of the cell of each.
@@ -187,10 +185,9 @@ pub(crate) struct KdTree {
 
 impl KdTree {
     /// One cell with one sample, at a place in it.
-    pub fn new(size: [u32; 2], exposure: Exposure, place: [u32; 2], radiance: Vec3) -> Self {
-        let factor = exposure.factor();
-        let means = vec![Vec3A::ZERO, shown(radiance, factor).into()];
-        Self { size, factor, nodes: Vec::new(), samples: vec![Sample { place, radiance }], means, root: Link(LEAF) }
+    pub fn new(size: [u32; 2], display: Display, place: [u32; 2], radiance: Vec3) -> Self {
+        let means = vec![Vec3A::ZERO, display.light(radiance).into()];
+        Self { size, display, nodes: Vec::new(), samples: vec![Sample { place, radiance }], means, root: Link(LEAF) }
     }
 
     /// All samples, in the order in which they were taken.
@@ -343,7 +340,7 @@ impl KdTree {
         let node = self.nodes.len() as u32;
         self.samples.push(Sample { place, radiance });
         self.nodes.push(Node { links, slot });
-        self.means.extend([Vec3A::ZERO, shown(radiance, self.factor).into()]);
+        self.means.extend([Vec3A::ZERO, self.display.light(radiance).into()]);
         self.set_link(slot, Link(node));
         node
     }
@@ -392,8 +389,11 @@ fn transposed(lines: [Line; 3]) -> [Line; 3] {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use scene::{Exposure, ToneCurve};
 
-    const DARK: Exposure = Exposure { ev: 0.0 };
+    fn display() -> Display {
+        Display::new(Exposure { ev: 0.0 }, ToneCurve::Shoulder)
+    }
 
     /// The spread of means that a function gives at −1, 0 and 1, less that in the middle.
     fn spread(value: impl Fn(f32, f32) -> f32) -> Spread {
@@ -425,7 +425,7 @@ mod tests {
     fn a_walk_knows_what_is_around_it() {
         for size in [[8, 8], [5, 3], [1, 6], [7, 7]] {
             let whole = Cell::around(size);
-            let mut tree = KdTree::new(size, DARK, whole.place(size, [0, 0]), Vec3::ZERO);
+            let mut tree = KdTree::new(size, display(), whole.place(size, [0, 0]), Vec3::ZERO);
             // Part everything down to pixels, each sample as bright as its number.
             loop {
                 let mut open = Vec::new();
@@ -489,7 +489,7 @@ mod tests {
     #[test]
     fn what_is_closed_below_is_closed_above() {
         let size = [2, 1];
-        let mut tree = KdTree::new(size, DARK, [0, 0], Vec3::ONE);
+        let mut tree = KdTree::new(size, display(), [0, 0], Vec3::ONE);
         let Halves::Both(_, cells) = Cell::around(size).halves(size) else { unreachable!("two pixels") };
         let node = tree.part(Slot::ROOT, 1, cells[1].corner, Vec3::ZERO);
         tree.update(&[(2 * PIXEL + 1, node)]);

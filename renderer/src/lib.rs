@@ -33,7 +33,7 @@ pub use cell::MOST_PIXELS;
 pub use confidence::Interval;
 pub use evaluation::{Evaluation, Evaluator};
 pub use eye::{Eye, SeenPoint, Sight};
-pub use film::{Film, Tile, shown};
+pub use film::{Film, Tile};
 pub use filter::Filter;
 pub use path_trace::{Estimate, PathLight, PathOptions, irradiance, irradiance_on};
 pub use reference::{Reference, ReferenceOptions, reference};

@@ -5,10 +5,9 @@
 //! library that keeps them does not tell; all are integrated when a picture is asked for.
 
 use glam::{DVec2, DVec3, Vec3};
-use scene::Exposure;
+use scene::Display;
 
 use crate::delaunay::{Delaunay, Mesh};
-use crate::film::shown;
 use crate::filter::{Filter, SummedFilter};
 use crate::quadratic_patch::patches;
 use crate::raster::{Piece, filtered};
@@ -26,24 +25,19 @@ pub enum Surface {
 pub struct ScatteredFilm {
     size: [u32; 2],
     filter: SummedFilter,
-    factor: Option<f32>,
+    display: Option<Display>,
     samples: Delaunay,
 }
 
 impl ScatteredFilm {
-    /// A black picture of so many pixels: of what a display shows with an exposure, or of radiance.
-    pub fn new(width: u32, height: u32, filter: Filter, exposure: Option<Exposure>) -> Self {
-        Self {
-            size: [width, height],
-            filter: SummedFilter::new(filter),
-            factor: exposure.map(Exposure::factor),
-            samples: Delaunay::default(),
-        }
+    /// A black picture of so many pixels: of what a display shows, or of radiance.
+    pub fn new(width: u32, height: u32, filter: Filter, display: Option<Display>) -> Self {
+        Self { size: [width, height], filter: SummedFilter::new(filter), display, samples: Delaunay::default() }
     }
 
     /// Adds radiance at a point of the image plane, W·sr⁻¹·m⁻².
     pub fn add(&mut self, point: DVec2, radiance: Vec3) {
-        let light = self.factor.map_or(radiance, |factor| shown(radiance, factor));
+        let light = self.display.map_or(radiance, |display| display.light(radiance));
         self.samples.insert(point, light);
     }
 
@@ -90,6 +84,7 @@ fn planes(mesh: &Mesh) -> Vec<Plane> {
 mod tests {
     use super::*;
     use crate::{AdaptiveOptions, AdaptiveSampler, Evaluation, Film, Interval, Rule};
+    use scene::{Exposure, ToneCurve};
 
     const SIZE: (u32, u32) = (40, 30);
 
@@ -129,14 +124,14 @@ mod tests {
     /// Cells of even light, planes and quadratics: as samples are added, all three come to the same picture.
     #[test]
     fn all_surfaces_converge_to_the_same_picture() {
-        let exposure = Exposure { ev: 0.5 };
+        let display = Display::new(Exposure { ev: 0.5 }, ToneCurve::Shoulder);
         let pictures = |interval: f64, filter: Filter| {
             let options = AdaptiveOptions {
                 seed: 3,
                 rule: Rule::Calibrated,
                 level: 0.99,
                 interval: Interval::Linear(interval),
-                exposure,
+                display,
             };
             let mut sampler = AdaptiveSampler::new(SIZE.0, SIZE.1, &options, &disk).expect("a picture");
             loop {
@@ -146,9 +141,9 @@ mod tests {
                 }
                 sampler.take(&batch.into_iter().map(disk).collect::<Vec<_>>());
             }
-            let mut cells = Film::new(SIZE.0, SIZE.1, filter, Some(exposure));
+            let mut cells = Film::new(SIZE.0, SIZE.1, filter, Some(display));
             cells.add(&sampler.tiles());
-            let mut film = ScatteredFilm::new(SIZE.0, SIZE.1, filter, Some(exposure));
+            let mut film = ScatteredFilm::new(SIZE.0, SIZE.1, filter, Some(display));
             sampler.points().for_each(|(point, radiance)| film.add(point, radiance));
             [cells.picture(), film.picture(Surface::Planar), film.picture(Surface::Smooth)]
         };

@@ -1,5 +1,7 @@
 //! From radiance to what a display shows: exposure, tone curve, sRGB encoding.
 
+use glam::Vec3;
+
 /// How bright a picture is made: radiance is multiplied by 2^EV.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Exposure {
@@ -82,6 +84,25 @@ impl ToneCurve {
     }
 }
 
+/// What a display shows of radiance, before its transfer function.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Display {
+    factor: f32,
+    curve: ToneCurve,
+}
+
+impl Display {
+    /// A display with an exposure and a tone curve.
+    pub fn new(exposure: Exposure, curve: ToneCurve) -> Self {
+        Self { factor: exposure.factor(), curve }
+    }
+
+    /// The light that is shown of a radiance, W·sr⁻¹·m⁻²; each channel in 0..=1.
+    pub fn light(self, radiance: Vec3) -> Vec3 {
+        (radiance * self.factor).map(|channel| self.curve.apply(channel))
+    }
+}
+
 /// An 8-bit sRGB value as a linear one, 0..=1: the inverse of [`encode_srgb`].
 pub fn decode_srgb(encoded: u8) -> f32 {
     let encoded = f32::from(encoded) / 255.0;
@@ -106,6 +127,13 @@ mod tests {
             assert_eq!([-1.0, 0.0].map(|dark| curve.apply(dark)), [0.0; 2]);
             assert!([1e30, f32::MAX, f32::INFINITY].iter().all(|&bright| curve.apply(bright) > 0.999), "{curve:?}");
         }
+    }
+
+    #[test]
+    fn a_display_shows_what_its_exposure_and_its_curve_make_of_radiance() {
+        let light = |curve| Display::new(Exposure { ev: 1.0 }, curve).light(Vec3::new(0.1, 0.4, -1.0));
+        assert_eq!(light(ToneCurve::Linear), Vec3::new(0.2, 0.8, 0.0));
+        assert_eq!(light(ToneCurve::Filmic).y, ToneCurve::Filmic.apply(0.8));
     }
 
     #[test]

@@ -27,7 +27,7 @@ pub use baked::{Baked, BakedElement, BakedError, BakedTriangle, DiscontinuityLin
 pub use bvh::{Bvh, Hit};
 pub use camera::{Camera, NamedCamera};
 pub use camera_path::{CameraKey, CameraPath, CameraPathError};
-pub use exposure::{Exposure, MIDDLE_GREY, ToneCurve, decode_srgb, encode_srgb};
+pub use exposure::{Display, Exposure, MIDDLE_GREY, ToneCurve, decode_srgb, encode_srgb};
 pub use half_edge::{HalfEdges, NO_TWIN};
 pub use interpolant::{Interpolant, SAMPLE_BARYCENTRICS};
 pub use light::Light;

@@ -4,9 +4,10 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 use renderer::{Filter, Interval, Rule};
+use scene::ToneCurve;
 
 use super::{CameraFlags, ExposureChoice, MOST_SAMPLES, SceneFlags};
-use super::{exposure, fraction, image_path, number, png_path, positive, size};
+use super::{exposure, fraction, image_path, number, png_path, positive, size, tone_curve};
 
 /// `halflight render`.
 #[derive(Debug, Args)]
@@ -29,6 +30,9 @@ pub struct RenderFlags {
     /// Exposure value, by which radiance is multiplied as 2^EV, or auto, which looks at 1024 points more
     #[arg(long, value_name = "EV|auto", default_value = "auto", value_parser = exposure, allow_hyphen_values = true)]
     pub exposure: ExposureChoice,
+    /// How exposed light is brought into what a display shows: straight with a shoulder, straight and clipped, or as film has it
+    #[arg(long, default_value = "shoulder", value_parser = tone_curve())]
+    pub tone_curve: ToneCurve,
     /// Where samples go
     #[arg(long, value_enum, default_value_t)]
     pub sampler: SamplerChoice,
