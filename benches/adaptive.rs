@@ -334,7 +334,6 @@ fn uniform() {
     views.push(View::of_data("office.obj", 1.5));
     views.push(View::of_data("office_evening.toml", 1.5));
     views.push(View::of_data("cornell_box.obj", -1.0));
-    views.push(View::of_data("blocker_plane.obj", 0.0));
     for view in &views {
         let truth = truth(view, COMPARED);
         view.look(COMPARED, |evaluate| {

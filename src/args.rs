@@ -249,6 +249,9 @@ pub struct ViewFlags {
     /// The first point of view
     #[command(flatten)]
     pub camera: CameraFlags,
+    /// What the picture is refined with while the view rests (key R)
+    #[command(flatten)]
+    pub radiance: RadianceFlags,
 }
 
 /// `halflight probe`.

@@ -42,7 +42,7 @@ impl LightSources {
     }
 
     /// The solution of a bake's scene, with the light of the bake.
-    fn solution(&self, baked: &Arc<Baked>) -> Arc<Solution> {
+    pub fn solution(&self, baked: &Arc<Baked>) -> Arc<Solution> {
         let mut solved = self.solved.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some((of, solution)) = &*solved
             && Arc::ptr_eq(of, baked)

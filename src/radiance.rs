@@ -1,13 +1,16 @@
 //! What a sample of a picture sees: the evaluators that samplers are handed, each over another stage of the program.
 
+use std::sync::Arc;
+
 use anyhow::{Result, bail, ensure};
 use renderer::{Evaluator, Eye, PathLight, PathOptions, SurfacePoint, Whitted};
-use scene::{Bvh, Provenance, Rgb, Scene};
-use solver::Gather;
+use scene::{Baked, Bvh, Camera, Provenance, Rgb, Scene};
+use solver::{Gather, Solution};
 
 use crate::args::{LightFlags, RadianceChoice, RadianceFlags, RenderFlags};
 use crate::failure::Usage;
 use crate::input::{Input, require_light};
+use crate::light_sources::LightSources;
 use crate::output::Outputs;
 use crate::pipeline;
 use crate::point_gather::PointGather;
@@ -34,7 +37,30 @@ pub fn check(flags: &RadianceFlags) -> Result<()> {
     Ok(())
 }
 
-/// Makes an evaluator of a view of a scene or a bake, and has `work` use it.
+/// A point of view, and what is to be seen from there.
+pub struct View {
+    /// Where from.
+    pub camera: Camera,
+    /// Columns and rows of the picture.
+    pub size: (u32, u32),
+    /// What a sample sees.
+    pub radiance: RadianceFlags,
+    /// Seed of paths.
+    pub seed: u64,
+}
+
+impl View {
+    fn of(flags: &RenderFlags, scene: &Scene) -> Result<Self> {
+        let camera = camera(&flags.camera.viewpoint()?, scene)?;
+        Ok(Self { camera, size: flags.size, radiance: flags.radiance, seed: flags.seed })
+    }
+
+    fn eye<'a>(&self, scene: &'a Scene, bvh: &'a Bvh) -> Eye<'a> {
+        Eye::new(scene, bvh, self.camera, self.size.0, self.size.1)
+    }
+}
+
+/// Makes an evaluator of the view that flags ask for, and has `work` use it.
 pub fn with_evaluator<T>(
     input: Input,
     flags: &RenderFlags,
@@ -47,62 +73,83 @@ pub fn with_evaluator<T>(
             check_bounces(flags, &baked.provenance)?;
         }
         let baked = input.into_baked(&flags.input, &asked, outputs)?;
-        let (mesh, reach) = (baked.bvh(), REACH * baked.scene.size());
-        let irradiance = |point: &SurfacePoint| {
-            let found = baked.locate(&mesh, point.position, point.normal, reach);
-            found.map_or(Rgb::ZERO, |(triangle, s, t)| baked.irradiance(triangle, s, t))
-        };
-        return view(&baked.scene, flags, |eye| work(&|point| eye.diffuse(point, |seen| (irradiance(seen), 0))));
+        return by_interpolants(&baked, &View::of(flags, &baked.scene)?, work);
     }
     let (scene, made) = match input {
         Input::Scene(scene) => (scene, None),
         Input::Baked(baked) => (baked.scene, Some(baked.provenance)),
     };
-    match flags.radiance.radiance {
-        RadianceChoice::Whitted => whitted(&scene, flags, work),
-        RadianceChoice::Gather => {
-            require_light(&flags.input, &scene)?;
-            // From the bake: its reflectors send what the bake says that they do.
-            let light = made.map_or(asked, |made| as_baked(&made, &asked));
-            let solution = pipeline::bake(&scene, &light, None).solution;
-            let gather = Gather::new(&scene, &solution);
-            let points = PointGather::new(&scene, &solution, &gather);
-            view(&scene, flags, |eye| work(&|point| eye.diffuse(point, |seen| (points.irradiance(seen), 0))))
-        }
-        RadianceChoice::Path | RadianceChoice::Interpolant => {
-            require_light(&flags.input, &scene)?;
-            let samples = flags.radiance.paths.unwrap_or(PATHS);
-            let options = PathOptions { samples, bounces: flags.radiance.bounces, seed: flags.seed };
-            let bvh = Bvh::of_scene(&scene);
-            let light = PathLight::new(&scene, &bvh, options);
-            view(&scene, flags, |eye| work(&|point| eye.diffuse(point, |seen| (light.irradiance(seen), samples))))
-        }
+    let view = View::of(flags, &scene)?;
+    if flags.radiance.radiance == RadianceChoice::Whitted {
+        ensure!(
+            scene.emitters().next().is_some() || !scene.lights.is_empty(),
+            "{}: there is no light; give a material an emitted radiance (W/(sr m²)), such as the line `Ke 10 10 10` in the MTL \
+             file, or add a [[light]] in a scene file",
+            flags.input.display()
+        );
+        return by_whitted(&scene, &view, work);
+    }
+    require_light(&flags.input, &scene)?;
+    if flags.radiance.radiance == RadianceChoice::Path {
+        return by_paths(&scene, &view, work);
+    }
+    // From the bake: its reflectors send what the bake says that they do.
+    let light = made.map_or(asked, |made| as_baked(&made, &asked));
+    by_gather(&scene, &pipeline::bake(&scene, &light, None).solution, &view, work)
+}
+
+/// Makes an evaluator of a view of a bake, and has `work` use it. A gather is from what the bake says that its elements reflect.
+pub fn with_evaluator_of<T>(
+    baked: &Arc<Baked>,
+    sources: &LightSources,
+    view: &View,
+    work: impl FnOnce(&Evaluator<'_>) -> T,
+) -> T {
+    match view.radiance.radiance {
+        RadianceChoice::Interpolant => by_interpolants(baked, view, work),
+        RadianceChoice::Gather => by_gather(&baked.scene, &sources.solution(baked), view, work),
+        RadianceChoice::Path => by_paths(&baked.scene, view, work),
+        RadianceChoice::Whitted => by_whitted(&baked.scene, view, work),
     }
 }
 
-/// Whitted's rays: direct light of surfaces is what a gather without reflectors says.
-fn whitted<T>(scene: &Scene, flags: &RenderFlags, work: impl FnOnce(&Evaluator<'_>) -> Result<T>) -> Result<T> {
-    ensure!(
-        scene.emitters().next().is_some() || !scene.lights.is_empty(),
-        "{}: there is no light; give a material an emitted radiance (W/(sr m²)), such as the line `Ke 10 10 10` in the MTL \
-         file, or add a [[light]] in a scene file",
-        flags.input.display()
-    );
+fn by_interpolants<T>(baked: &Baked, view: &View, work: impl FnOnce(&Evaluator<'_>) -> T) -> T {
+    let (mesh, reach) = (baked.bvh(), REACH * baked.scene.size());
+    let irradiance = |point: &SurfacePoint| {
+        let found = baked.locate(&mesh, point.position, point.normal, reach);
+        found.map_or(Rgb::ZERO, |(triangle, s, t)| baked.irradiance(triangle, s, t))
+    };
+    let bvh = Bvh::of_scene(&baked.scene);
+    let eye = view.eye(&baked.scene, &bvh);
+    work(&|point| eye.diffuse(point, |seen| (irradiance(seen), 0)))
+}
+
+fn by_gather<T>(scene: &Scene, solution: &Solution, view: &View, work: impl FnOnce(&Evaluator<'_>) -> T) -> T {
+    let gather = Gather::new(scene, solution);
+    let points = PointGather::new(scene, solution, &gather);
+    let bvh = Bvh::of_scene(scene);
+    let eye = view.eye(scene, &bvh);
+    work(&|point| eye.diffuse(point, |seen| (points.irradiance(seen), 0)))
+}
+
+fn by_paths<T>(scene: &Scene, view: &View, work: impl FnOnce(&Evaluator<'_>) -> T) -> T {
+    let samples = view.radiance.paths.unwrap_or(PATHS);
+    let options = PathOptions { samples, bounces: view.radiance.bounces, seed: view.seed };
+    let bvh = Bvh::of_scene(scene);
+    let light = PathLight::new(scene, &bvh, options);
+    let eye = view.eye(scene, &bvh);
+    work(&|point| eye.diffuse(point, |seen| (light.irradiance(seen), samples)))
+}
+
+/// Direct light of surfaces is what a gather without reflectors says.
+fn by_whitted<T>(scene: &Scene, view: &View, work: impl FnOnce(&Evaluator<'_>) -> T) -> T {
     let (solution, _) = pipeline::solve(scene, &LightFlags { bounces: Some(0), ..LightFlags::default() }, None);
     let gather = Gather::new(scene, &solution);
     let points = PointGather::new(scene, &solution, &gather);
     let direct = |point: &SurfacePoint| points.irradiance(point);
-    view(scene, flags, |eye| {
-        let whitted = Whitted::new(eye, &direct);
-        work(&|point| whitted.evaluate(point))
-    })
-}
-
-/// Has `work` look at a scene from the point of view of the flags.
-fn view<T>(scene: &Scene, flags: &RenderFlags, work: impl FnOnce(Eye<'_>) -> Result<T>) -> Result<T> {
-    let camera = camera(&flags.camera.viewpoint()?, scene)?;
     let bvh = Bvh::of_scene(scene);
-    work(Eye::new(scene, &bvh, camera, flags.size.0, flags.size.1))
+    let whitted = Whitted::new(view.eye(scene, &bvh), &direct);
+    work(&|point| whitted.evaluate(point))
 }
 
 /// Refuses bounces that are not those of a bake, whose interpolants hold its own.

@@ -20,6 +20,8 @@ use crate::light_sources::LightSources;
 use crate::output::Outputs;
 use crate::pipeline::Onlooker;
 use crate::progress::say;
+use crate::radiance;
+use crate::refine::refine;
 use crate::shot;
 use crate::watch::Watch;
 
@@ -29,6 +31,7 @@ const NO_WINDOW: &str = "no window (`halflight shot` draws a picture without one
 /// Opens a window; returns when it is closed.
 pub fn run(flags: &ViewFlags, outputs: &Outputs) -> Result<Outcome> {
     let viewpoint = flags.camera.viewpoint()?;
+    radiance::check(&flags.radiance)?;
     let path = flags.input.clone();
     let watch = Watch::over(&path);
     // What is not there, and what is no bake, is said without a window.
@@ -45,7 +48,7 @@ pub fn run(flags: &ViewFlags, outputs: &Outputs) -> Result<Outcome> {
     } else {
         work = Some(bake_behind(path, flags.reading, viewpoint, outputs.clone(), updates));
     }
-    let seen = system.open(walkthrough(&flags.input, received, outputs.clone()));
+    let seen = system.open(walkthrough(flags, received, outputs.clone()));
     // A bake that is not finished ends with the program, but not in the midst of a file.
     std::mem::forget(outputs.hold());
     seen.context(NO_WINDOW)?;
@@ -58,15 +61,19 @@ pub fn run(flags: &ViewFlags, outputs: &Outputs) -> Result<Outcome> {
 }
 
 /// What the window of a file shows, and whom it asks.
-fn walkthrough(input: &Path, updates: Receiver<Update>, outputs: Outputs) -> Walkthrough {
-    let name = input.file_name().unwrap_or(input.as_os_str()).to_string_lossy();
-    let (sources, input) = (LightSources::default(), input.to_owned());
+fn walkthrough(flags: &ViewFlags, updates: Receiver<Update>, outputs: Outputs) -> Walkthrough {
+    let name = flags.input.file_name().unwrap_or(flags.input.as_os_str()).to_string_lossy();
+    let (sources, input, radiance) = (Arc::new(LightSources::default()), flags.input.clone(), flags.radiance);
+    let sources_of_pictures = sources.clone();
     Walkthrough {
         name: format!("{name} – Halflight"),
         updates,
         explain: Arc::new(move |baked, point| sources.at(baked, point)),
         save: Arc::new(move |baked, frame, kind| {
             save(baked, frame, kind, &input, &outputs).map_err(|error| sentence(&error))
+        }),
+        refine: Arc::new(move |baked, frame, wanted, show| {
+            refine(baked, &sources_of_pictures, frame, radiance, wanted, show).map_err(|error| sentence(&error))
         }),
         tell: Box::new(|what| say(what)),
     }

@@ -115,9 +115,13 @@ fn adaptive_pictures_are_nearer_than_even_ones() {
         let (_, _, pixels) = formats::read_png(&output).unwrap();
         (made, pixels.iter().map(|pixel| Vec3::from(pixel.map(f32::from))).collect::<Vec<Vec3>>())
     };
-    for (scene, least) in
-        [("lamp.obj", 2.0), ("office.obj", 2.0), ("office_evening.toml", 2.0), ("cornell_box.obj", 1.0), ("blocker_plane.obj", 1.0)]
-    {
+    for (scene, least) in [
+        ("lamp.obj", 2.0),
+        ("office.obj", 2.0),
+        ("office_evening.toml", 2.0),
+        ("cornell_box.obj", 1.0),
+        ("blocker_plane.obj", 1.0),
+    ] {
         let scene = data(&format!("scenes/{scene}"));
         let (_, truth) = shown(&scene, &["--sampler", "full", "--budget", "64"]);
         for budget in ["0.25", "1"] {
@@ -136,7 +140,8 @@ fn the_same_seed_gives_the_same_bytes_at_any_number_of_threads() {
     let picture = |threads: &str, options: &[&str]| {
         let output = folder.path().join("picture.png");
         let scene = data("scenes/cornell_box.obj");
-        let fixed = ["render", text(&scene), "-o", text(&output), "--size", "90x70", "--radiance", "path", "--budget", "1.5"];
+        let fixed =
+            ["render", text(&scene), "-o", text(&output), "--size", "90x70", "--radiance", "path", "--budget", "1.5"];
         let mut command = halflight();
         command.args(fixed).args(options).env("RAYON_NUM_THREADS", threads).assert().success();
         std::fs::read(&output).unwrap()
@@ -152,7 +157,8 @@ fn what_was_done_is_told() {
     let folder = folder();
     let (map, snapshots) = (folder.path().join("map.png"), folder.path().join("deep/snapshots"));
     let output = folder.path().join("picture.png");
-    let options = ["--size", "64x48", "--sample-map", text(&map), "--snapshots", text(&snapshots), "--radiance", "whitted"];
+    let options =
+        ["--size", "64x48", "--sample-map", text(&map), "--snapshots", text(&snapshots), "--radiance", "whitted"];
     let made = render(&data("scenes/office.obj"), &output, &options);
     let (samples, pixels) = (made["samples"].as_u64().unwrap(), 64 * 48);
     assert_eq!(made["closed_share"].as_f64(), Some(1.0));
@@ -167,11 +173,13 @@ fn what_was_done_is_told() {
     assert_eq!(red, histogram[21]);
     let mut names: Vec<PathBuf> = std::fs::read_dir(&snapshots).unwrap().map(|entry| entry.unwrap().path()).collect();
     names.sort();
-    let counts: Vec<u64> = names.iter().map(|path| path.file_stem().unwrap().to_str().unwrap().parse().unwrap()).collect();
+    let counts: Vec<u64> =
+        names.iter().map(|path| path.file_stem().unwrap().to_str().unwrap().parse().unwrap()).collect();
     assert!(counts.len() >= 3 && counts[0] >= 1024 && counts.windows(2).all(|pair| pair[0] < pair[1]), "{counts:?}");
     assert!(names.iter().all(|path| formats::read_png(path).unwrap().2.len() == 64 * 48));
     // A share of the pixels, and a budget that no picture needs.
-    let few = render(&data("scenes/office.obj"), &output, &["--size", "64x48", "--radiance", "whitted", "--budget", "6%"]);
+    let few =
+        render(&data("scenes/office.obj"), &output, &["--size", "64x48", "--radiance", "whitted", "--budget", "6%"]);
     assert_eq!(few["samples"].as_u64(), Some((0.06 * f64::from(pixels)).round() as u64));
     assert!(few["closed_share"].as_f64().unwrap() < 1.0);
 }
@@ -185,13 +193,27 @@ fn light_that_is_no_number_is_left_out() {
     let light = "[[light]]\nposition = [2, 2, 1.5]\nintensity = 1e300\n";
     std::fs::write(&scene, format!("up = \"z\"\n[[model]]\nfile = {:?}\n{light}", text(&model))).unwrap();
     let output = folder.path().join("out.exr");
-    let arguments =
-        ["render", text(&scene), "-o", text(&output), "--size", "48x36", "--radiance", "whitted", "--exposure", "0", "--json"];
+    let arguments = [
+        "render",
+        text(&scene),
+        "-o",
+        text(&output),
+        "--size",
+        "48x36",
+        "--radiance",
+        "whitted",
+        "--exposure",
+        "0",
+        "--json",
+    ];
     let made = run(&arguments);
     let said = String::from_utf8(made.stderr).unwrap();
     let report: Value = serde_json::from_slice(&made.stdout).unwrap();
     let excluded = report["excluded"].as_u64().unwrap();
-    assert!(excluded > 1000 && said.contains(&format!("{excluded} of")) && said.contains("no finite radiance"), "{said}");
+    assert!(
+        excluded > 1000 && said.contains(&format!("{excluded} of")) && said.contains("no finite radiance"),
+        "{said}"
+    );
     assert!(formats::read_exr(&output).unwrap().2.iter().all(|pixel| pixel.is_finite()));
 }
 
@@ -209,7 +231,7 @@ fn mirrors_and_lights_without_a_surface_are_seen() {
     let camera = "[[camera]]\nname = \"c\"\neye = [0, -3, 3]\ntarget = [0, 0, 0]\nup = [0, 0, 1]\n";
     let model = "up = \"z\"\n[[model]]\nfile = \"floor.obj\"\n";
     let light = "[[light]]\ntowards = [0, 0, 1]\nirradiance = 3\n";
-    let options = ["--size", "9x9", "--radiance", "whitted"];
+    let options = ["--size", "9x9", "--radiance", "whitted", "--filter", "box"];
     let lit = radiance(&scene("lit.toml", &format!("{model}{camera}{light}")), folder.path(), &options);
     // L = ρE/π, the sun overhead.
     assert!((lit[40] - Vec3::splat(0.4 * 3.0 / std::f32::consts::PI)).length() < 1e-5, "{}", lit[40]);
@@ -232,7 +254,8 @@ fn an_interrupted_picture_is_the_one_so_far() {
     let folder = folder();
     let (output, snapshots) = (folder.path().join("out.png"), folder.path().join("snapshots"));
     let scene = data("scenes/cornell_box.obj");
-    let arguments = ["render", text(&scene), "-o", text(&output), "--size", "400x400", "--radiance", "path", "--paths", "64"];
+    let arguments =
+        ["render", text(&scene), "-o", text(&output), "--size", "400x400", "--radiance", "path", "--paths", "64"];
     let mut render = Command::new(env!("CARGO_BIN_EXE_halflight"))
         .args(arguments)
         .args(["--json", "--snapshots", text(&snapshots)])

@@ -127,6 +127,36 @@ fn a_click_reads_the_light() {
     assert_eq!(window.close(), Some(0));
 }
 
+/// At rest the picture becomes that of `render`; where one moves on it is that of `shot` again.
+#[test]
+fn a_view_at_rest_is_refined() {
+    let Some(desktop) = Desktop::start() else { return };
+    let folder = folder();
+    let mut window = desktop.view(cornell_box(), folder.path(), &[]);
+    // Metered once, and then fixed: the exposure that is said is the one that is seen.
+    window.keys(&["Tab"]);
+    window.picture_at_rest(folder.path());
+    window.keys(&["x", "p"]);
+    window.wait_until_said("cornell_box-1.png is written, EV ");
+    let said = window.said();
+    let ev = said.split("EV ").nth(1).unwrap().split_whitespace().next().unwrap();
+    window.keys(&["r"]);
+    window.wait_until_said("refined: every pixel is known");
+    let seen = window.picture_at_rest(folder.path());
+    let rendered = folder.path().join("rendered.png");
+    run(&["render", text(cornell_box()), "-o", text(&rendered), "--size", "640x480", "--exposure", ev]);
+    let rendered = formats::read_png(&rendered).unwrap().2;
+    let off = share_off(&seen, &rendered);
+    assert!(off <= SHARE, "{:.2} % of the pixels differ from render's", 100.0 * off);
+    assert!(
+        share_off(&rendered, &shot(cornell_box(), folder.path(), &["--exposure", ev])) > 4.0 * SHARE,
+        "edges are smooth"
+    );
+    window.keys(&["r"]);
+    shows_what_shot_draws(&mut window, cornell_box(), folder.path(), &["--exposure", ev]);
+    assert_eq!(window.close(), Some(0));
+}
+
 #[test]
 fn a_scene_is_seen_while_it_is_baked_and_ends_as_its_bake() {
     let Some(desktop) = Desktop::start() else { return };
@@ -243,6 +273,7 @@ fn fifty_windows_one_after_another() {
             updates: received,
             explain: Arc::new(|_, _| Ok(Vec::new())),
             save: Arc::new(|_, _, _| Ok(String::new())),
+            refine: Arc::new(|_, _, _, _| Ok(())),
             tell: Box::new(|_| ()),
         };
         system.open(walkthrough).unwrap();

@@ -23,6 +23,8 @@ pub(crate) enum Command {
     CopyCamera,
     /// Writes a picture of the view.
     Save(PictureKind),
+    /// Refines the picture while the view rests, or not.
+    ToggleRefinement,
     /// Makes the picture brighter by so many stops.
     Brighten(f32),
     /// Meters the view, or keeps the exposure that it has.
@@ -72,7 +74,7 @@ const CAMERA_KEYS: [KeyCode; 9] = [
 ];
 
 /// What the keys do, as the window tells it.
-pub(crate) const KEYS: [(&str, &str); 17] = [
+pub(crate) const KEYS: [(&str, &str); 18] = [
     ("W A S D  Q E", "move; sink and rise"),
     ("Shift  Ctrl", "faster; slower"),
     ("left drag", "look around"),
@@ -87,6 +89,7 @@ pub(crate) const KEYS: [(&str, &str); 17] = [
     ("[  ]  X", "darker; brighter; metered"),
     ("T", "next tone curve"),
     ("L", "lines to the sources"),
+    ("R", "refine the picture at rest"),
     ("P", "picture: PNG; with Shift, EXR"),
     ("Tab  H", "panels; these keys"),
     ("Esc", "close"),
@@ -106,6 +109,7 @@ impl Command {
             KeyCode::KeyF => Self::Frame,
             KeyCode::KeyO => Self::ToggleOrbit,
             KeyCode::KeyC => Self::CopyCamera,
+            KeyCode::KeyR => Self::ToggleRefinement,
             KeyCode::KeyP if shift => Self::Save(PictureKind::Exr),
             KeyCode::KeyP => Self::Save(PictureKind::Png),
             KeyCode::BracketLeft => Self::Brighten(-STOPS),

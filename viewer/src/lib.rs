@@ -40,6 +40,7 @@ mod picture;
 mod read_back;
 mod reading;
 mod records;
+mod refinement;
 mod screen;
 mod spans;
 #[cfg(test)]
@@ -63,5 +64,5 @@ pub use mode::{Mode, UnknownMode};
 pub use picture::{Frame, Picture};
 pub use timing::FrameTimes;
 pub use twin::{Twin, draw_on_cpu};
-pub use update::{Explain, LightSource, PictureKind, Save, SurfacePoint, Update, Walkthrough};
+pub use update::{Explain, LightSource, PictureKind, Refine, Refined, Save, SurfacePoint, Update, Walkthrough};
 pub use window::WindowSystem;

@@ -8,7 +8,9 @@ use std::sync::{
 use scene::Baked;
 use winit::event_loop::EventLoopProxy;
 
-use crate::{Explain, Gpu, LightSource, SurfacePoint, Update, ViewerError, gpu::ResidentBake, twin::Twin, walk::Shown};
+use crate::{
+    Explain, Gpu, LightSource, Refined, SurfacePoint, Update, ViewerError, gpu::ResidentBake, twin::Twin, walk::Shown,
+};
 
 /// Something that another thread has done.
 pub(crate) enum Event {
@@ -16,6 +18,8 @@ pub(crate) enum Event {
     Ready(Arc<Shown>, Option<(Arc<Gpu>, Result<ResidentBake, ViewerError>)>),
     /// An update that is no bake.
     Update(Update),
+    /// A finer picture of the view that was refined by a number, or why there is none.
+    Refined(u64, Result<Refined, String>),
     /// The sources of the light at a point, or why there are none.
     Answer(SurfacePoint, Result<Vec<LightSource>, String>),
     /// A graphics device is gone: its serial number, and what its driver says.

@@ -3,10 +3,22 @@
 
 use std::sync::Arc;
 
-use egui::{Color32, CornerRadius, FontFamily, FontId, Order, Pos2, Stroke, TextStyle, ViewportId, Visuals};
+use egui::{
+    Color32, ColorImage, CornerRadius, FontFamily, FontId, LayerId, Order, Pos2, Rect, Stroke, TextStyle,
+    TextureHandle, TextureOptions, ViewportId, Visuals,
+};
 use winit::{event::WindowEvent, window::Window};
 
-use crate::{command::Command, marks, pace::Pace, painting::Painting, panels, screen::Screen, walk::Walk};
+use crate::{
+    Refined,
+    command::Command,
+    marks,
+    pace::Pace,
+    painting::Painting,
+    panels::{self, Seen},
+    screen::Screen,
+    walk::Walk,
+};
 
 /// Opacity of panels, 0..=255: what is behind them still shows.
 const OPACITY: u8 = 215;
@@ -18,10 +30,15 @@ pub(crate) struct Overlay {
     window: Arc<Window>,
     /// Where the cursor is, points.
     cursor: Pos2,
+    /// The longest side of a texture, texels.
+    largest_texture: usize,
+    /// The finer picture that was painted last.
+    refined: Option<(Arc<Refined>, TextureHandle)>,
 }
 
 impl Overlay {
-    pub fn new(window: Arc<Window>) -> Self {
+    /// The panels of a window, where a texture has so many texels to a side at most.
+    pub fn new(window: Arc<Window>, largest_texture: usize) -> Self {
         let context = egui::Context::default();
         context.set_theme(egui::Theme::Dark);
         context.set_visuals(visuals());
@@ -42,8 +59,15 @@ impl Overlay {
             style.animation_time = 0.0;
         });
         let scale = window.scale_factor() as f32;
-        let state = egui_winit::State::new(context.clone(), ViewportId::ROOT, &*window, Some(scale), None, None);
-        Self { context, state, window, cursor: Pos2::ZERO }
+        let state = egui_winit::State::new(
+            context.clone(),
+            ViewportId::ROOT,
+            &*window,
+            Some(scale),
+            None,
+            Some(largest_texture),
+        );
+        Self { context, state, window, cursor: Pos2::ZERO, largest_texture, refined: None }
     }
 
     /// Notes an event: whether it is a panel's, and whether panels change by it.
@@ -64,16 +88,32 @@ impl Overlay {
         (over_panel, response.repaint)
     }
 
-    /// Lays the panels out over a walk; what their buttons ask for, whether they change by themselves, and how they look.
-    pub fn lay_out(&mut self, walk: &mut Walk, pace: &Pace, screen: &Screen) -> (Vec<Command>, bool, Painting) {
+    /// Lays the panels out over a walk, and a finer picture of a size in pixels below them; what their buttons ask for, whether they
+    /// change by themselves, and how they look.
+    pub fn lay_out(
+        &mut self,
+        walk: &mut Walk,
+        pace: &Pace,
+        screen: &Screen,
+        refined: Option<((u32, u32), &Arc<Refined>)>,
+    ) -> (Vec<Command>, bool, Painting) {
+        self.load(refined);
         let mut input = self.state.take_egui_input(&self.window);
         // Tab is a key of the walk, and would else go from button to button.
         input.events.retain(|event| !matches!(event, egui::Event::Key { key: egui::Key::Tab, .. }));
         let mut commands = Vec::new();
+        let finer = self.refined.as_ref();
         let mut output = self.context.run_ui(input, |ui| {
+            if let Some((_, texture)) = finer {
+                // Texel by pixel, whatever a point is.
+                let area = Rect::from_min_size(Pos2::ZERO, texture.size_vec2() / ui.ctx().pixels_per_point());
+                let whole = Rect::from_min_max(Pos2::ZERO, Pos2::new(1.0, 1.0));
+                ui.ctx().layer_painter(LayerId::background()).image(texture.id(), area, whole, Color32::WHITE);
+            }
             if walk.panels {
                 marks::draw(ui, walk);
-                panels::lay_out(ui, walk, pace, screen, &mut commands);
+                let refined = finer.map(|(refined, _)| refined.as_ref());
+                panels::lay_out(ui, walk, &Seen { pace, screen, refined }, &mut commands);
             }
         });
         self.state.handle_platform_output(&self.window, std::mem::take(&mut output.platform_output));
@@ -81,6 +121,23 @@ impl Overlay {
         let primitives = self.context.tessellate(std::mem::take(&mut output.shapes), output.pixels_per_point);
         let textures = std::mem::take(&mut output.textures_delta);
         (commands, changes, Painting { primitives, textures, pixels_per_point: output.pixels_per_point })
+    }
+
+    /// Makes a texture of a finer picture, unless it is the one that there is.
+    fn load(&mut self, refined: Option<((u32, u32), &Arc<Refined>)>) {
+        let Some(((width, height), refined)) = refined else {
+            self.refined = None;
+            return;
+        };
+        let is_loaded = self.refined.as_ref().is_some_and(|(loaded, _)| Arc::ptr_eq(loaded, refined));
+        let size = [width as usize, height as usize];
+        let fits = size[0] * size[1] == refined.pixels.len() && size[0].max(size[1]) <= self.largest_texture;
+        if is_loaded || !fits {
+            return;
+        }
+        let pixels = refined.pixels.iter().map(|&[r, g, b]| Color32::from_rgb(r, g, b)).collect();
+        let texture = self.context.load_texture("refined", ColorImage::new(size, pixels), TextureOptions::NEAREST);
+        self.refined = Some((refined.clone(), texture));
     }
 
     /// Puts a text on the clipboard.

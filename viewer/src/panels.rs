@@ -6,7 +6,7 @@ use egui::{Align2, Area, Color32, Frame, Grid, Id, ProgressBar, RichText, Slider
 use scene::{LUMINOUS_EFFICACY, Rgb, ToneCurve, luminance};
 
 use crate::{
-    Mode, PictureKind,
+    Mode, PictureKind, Refined,
     command::{Command, KEYS},
     digits::{Number, colour, place},
     marks::{self, colour_of},
@@ -26,14 +26,23 @@ const MARGIN: f32 = 8.0;
 const EVS: std::ops::RangeInclusive<f32> = -12.0..=12.0;
 const GREYS: std::ops::RangeInclusive<f64> = 0.02..=0.8;
 
+/// What is seen beside the walk.
+pub(crate) struct Seen<'a> {
+    pub pace: &'a Pace,
+    pub screen: &'a Screen,
+    /// The finer picture, where there is one.
+    pub refined: Option<&'a Refined>,
+}
+
 /// Lays out all panels; what their buttons ask for is added to `commands`.
-pub(crate) fn lay_out(ui: &mut Ui, walk: &mut Walk, pace: &Pace, screen: &Screen, commands: &mut Vec<Command>) {
+pub(crate) fn lay_out(ui: &mut Ui, walk: &mut Walk, seen: &Seen<'_>, commands: &mut Vec<Command>) {
     panel("view", Align2::LEFT_TOP).show(ui.ctx(), |ui| {
         ui.set_width(LEFT);
         work(ui, walk);
-        speed(ui, walk, pace, screen);
+        speed(ui, walk, seen);
         ui.separator();
         mode(ui, walk);
+        refinement(ui, walk, seen, commands);
         brightness(ui, walk, commands);
         ui.separator();
         cameras(ui, walk, commands);
@@ -78,7 +87,21 @@ fn work(ui: &mut Ui, walk: &Walk) {
     }
 }
 
-fn speed(ui: &mut Ui, walk: &Walk, pace: &Pace, screen: &Screen) {
+/// Whether the picture is refined at rest, and how far it is.
+fn refinement(ui: &mut Ui, walk: &Walk, seen: &Seen<'_>, commands: &mut Vec<Command>) {
+    ui.horizontal(|ui| {
+        if ui.selectable_label(walk.refines, "refines at rest").on_hover_text("R").clicked() {
+            commands.push(Command::ToggleRefinement);
+        }
+        if let Some(refined) = seen.refined {
+            let (known, samples) = (100.0 * refined.known, refined.samples_a_pixel);
+            ui.label(faint(format!("{known:.0} %, {samples:.2} a pixel")));
+        }
+    });
+}
+
+fn speed(ui: &mut Ui, walk: &Walk, seen: &Seen<'_>) {
+    let Seen { pace, screen, .. } = seen;
     if let Some(shown) = &walk.shown {
         let baked = &shown.baked;
         ui.label(format!("{} triangles", grouped(baked.triangles.len())));

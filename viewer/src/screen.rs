@@ -67,6 +67,11 @@ impl Screen {
         }
     }
 
+    /// The longest side of a texture, texels.
+    pub fn largest_texture(&self) -> usize {
+        self.gpu().map_or(usize::MAX, |gpu| gpu.device.limits().max_texture_dimension_2d as usize)
+    }
+
     /// What draws, for the user.
     pub fn name(&self) -> String {
         self.gpu().map_or_else(|| "CPU".to_owned(), |gpu| gpu.adapter_name())

@@ -66,6 +66,22 @@ pub type Explain = dyn Fn(&Arc<Baked>, SurfacePoint) -> Result<Vec<LightSource>,
 /// Writes a picture of a bake, and says where, or why not. Called on a thread of its own.
 pub type Save = dyn Fn(&Baked, &Frame, PictureKind) -> Result<String, String> + Send + Sync;
 
+/// A picture of a view, finer than the frame.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Refined {
+    /// As displayed, sRGB, row by row.
+    pub pixels: Vec<[u8; 3]>,
+    /// Share of the pixels that are known, 0..=1.
+    pub known: f64,
+    /// Samples so far, as a mean over the pixels.
+    pub samples_a_pixel: f64,
+}
+
+/// Refines the picture of a bake: shows finer and finer ones, until there is no finer one or none is wanted. Called on a thread of its
+/// own.
+pub type Refine =
+    dyn Fn(&Arc<Baked>, &Frame, &(dyn Fn() -> bool + Sync), &dyn Fn(Refined)) -> Result<(), String> + Send + Sync;
+
 /// What a window shows, and whom it asks.
 pub struct Walkthrough {
     /// What is shown, for the title.
@@ -76,6 +92,8 @@ pub struct Walkthrough {
     pub explain: Arc<Explain>,
     /// Writes pictures.
     pub save: Arc<Save>,
+    /// Refines pictures.
+    pub refine: Arc<Refine>,
     /// Is told every notice, where windows and what they show are soon gone.
     pub tell: Box<dyn Fn(&str)>,
 }

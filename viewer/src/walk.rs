@@ -79,6 +79,8 @@ pub(crate) struct Walk {
     pub clicked: Option<Clicked>,
     pub lines: bool,
     pub blockers: bool,
+    /// Whether the picture is refined while the view rests.
+    pub refines: bool,
     pub panels: bool,
     pub help: bool,
     /// What is being done outside: its name, and the part that is done.
@@ -102,6 +104,7 @@ impl Default for Walk {
             clicked: None,
             lines: true,
             blockers: false,
+            refines: false,
             panels: true,
             help: false,
             work: None,
@@ -236,6 +239,7 @@ impl Walk {
             }
             Command::ToggleMetering => self.exposure.metered = !self.exposure.metered,
             Command::NextCurve => self.curve = ToneCurve::ALL[(self.curve as usize + 1) % ToneCurve::ALL.len()],
+            Command::ToggleRefinement => self.refines = !self.refines,
             Command::ToggleLines => self.lines = !self.lines,
             Command::TogglePanels => self.panels = !self.panels,
             Command::ToggleHelp => {

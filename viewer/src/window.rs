@@ -24,6 +24,7 @@ use crate::{
     overlay::Overlay,
     pace::{FrameClock, Pace},
     reading::sources_sentence,
+    refinement::Refinements,
     screen::{Presented, Screen},
     walk::{Errand, Walk},
 };
@@ -74,10 +75,15 @@ impl WindowSystem {
         self.run(session)
     }
 
-    fn session(&self, Walkthrough { name, updates, explain, save, tell }: Walkthrough) -> Session {
+    fn session(&self, Walkthrough { name, updates, explain, save, refine, tell }: Walkthrough) -> Session {
         let events = self.event_loop.create_proxy();
         let gpu = Arc::new(GpuSlot::default());
         pass_on(updates, gpu.clone(), events.clone());
+        let refined = events.clone();
+        let pass = move |number, refinement| {
+            // A closed window has no use for it.
+            let _ = refined.send_event(Event::Refined(number, refinement));
+        };
         Session {
             name,
             walk: Walk::default(),
@@ -89,6 +95,7 @@ impl WindowSystem {
             failures: Vec::new(),
             gpu,
             questions: asker(explain, events.clone()),
+            refinements: Refinements::new(refine, Arc::new(pass)),
             events,
             save,
             tell,
@@ -134,6 +141,7 @@ struct Session {
     failures: Vec<Instant>,
     gpu: Arc<GpuSlot>,
     questions: Sender<(Arc<Baked>, SurfacePoint)>,
+    refinements: Refinements,
     events: EventLoopProxy<Event>,
     save: Arc<Save>,
     tell: Box<dyn Fn(&str)>,
@@ -177,7 +185,7 @@ impl Session {
             screen.show(&shown, None)?;
         }
         self.gpu.set(screen.gpu().cloned());
-        let overlay = Overlay::new(window.clone());
+        let overlay = Overlay::new(window.clone(), screen.largest_texture());
         self.stage = Some(Stage { window, screen, overlay });
         if !in_vain.is_empty() {
             self.say(in_vain.join("; "));
@@ -265,8 +273,12 @@ impl Session {
         let seconds = self.last_step.map_or(0.0, |last| (now - last).as_secs_f64().min(LONGEST_STEP));
         let steering = self.walk.steered(self.hands.take_steering(), self.hands.drag());
         let moves = self.walk.step(&steering, seconds, size);
+        let is_at_rest = self.walk.refines && !moves;
+        let shown = self.walk.shown.as_ref().filter(|_| is_at_rest);
+        self.refinements.follow(shown.map(|shown| &shown.baked).zip(self.walk.frame(size)));
         clock.lap();
-        let (commands, changes, painting) = stage.overlay.lay_out(&mut self.walk, &self.pace, &stage.screen);
+        let refined = self.refinements.finest().map(|refined| (size, refined));
+        let (commands, changes, painting) = stage.overlay.lay_out(&mut self.walk, &self.pace, &stage.screen, refined);
         clock.lap();
         let presented = stage.screen.present(self.walk.frame(size).as_ref(), painting, !moves)?;
         clock.lap();
@@ -317,6 +329,13 @@ impl ApplicationHandler<Event> for Session {
                     clicked.sources = Some(sources);
                 }
             }
+            Event::Refined(number, Ok(refined)) => {
+                let (is_known, samples) = (refined.known >= 1.0, refined.samples_a_pixel);
+                if self.refinements.take(number, refined) && is_known {
+                    (self.tell)(&format!("refined: every pixel is known, by {samples:.2} samples a pixel"));
+                }
+            }
+            Event::Refined(_, Err(why)) => self.say(why),
             Event::DeviceLost(device, said) => {
                 let is_ours =
                     matches!(&self.stage, Some(Stage { screen: Screen::Gpu(screen), .. }) if screen.serial == device);
@@ -426,6 +445,7 @@ mod tests {
             updates: received,
             explain: Arc::new(|_, _| Ok(Vec::new())),
             save: Arc::new(|_, _, _| Ok(String::new())),
+            refine: Arc::new(|_, _, _, _| Ok(())),
             tell: Box::new(move |what| heard.lock().unwrap().push(what.to_owned())),
         };
         updates.send(Update::Bake(Arc::new(room()))).unwrap();
