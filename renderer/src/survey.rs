@@ -24,7 +24,8 @@ const FEW: usize = 4;
 
 /// What the variance by the calibrated rule is multiplied by. About the plane the means next to a sharp border scatter more than
 /// samples in the cells on it do, and a third of the cells counted are on it; in a texture without borders neither is so. With
-/// this, 99.9 % of the pixels keep an interval that is asked for at 99 %, and in a fractal texture 99.3 %.
+/// this, of pixels that are asked for at 99 % 99.8 % keep the interval at 512 × 512 pixels, and 99.3 % in a fractal texture; where
+/// borders are as dense as pixels, fewer: 98 % of a small picture of an office.
 const BORDERS: f32 = 0.5;
 
 /// Degrees of freedom of nine means about a plane.
