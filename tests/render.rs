@@ -103,7 +103,7 @@ fn a_picture_is_the_one_that_shot_draws() {
     assert!(count * 10 > ours.len() * 8, "{count} of {} pixels", ours.len());
 }
 
-/// The RMSE of what is shown against many samples a pixel: nowhere more than that of as many even samples, and at most half of it once
+/// The RMSE of the light that is shown against many samples a pixel: nowhere more than that of as many even samples, and at most half of it once
 /// there is a sample a pixel.
 #[test]
 fn adaptive_pictures_are_nearer_than_even_ones() {
@@ -113,7 +113,7 @@ fn adaptive_pictures_are_nearer_than_even_ones() {
         let common = ["--size", "96x96", "--radiance", "whitted", "--filter", "box", "--exposure", "1"];
         let made = render(scene, &output, &[&common[..], options].concat());
         let (_, _, pixels) = formats::read_png(&output).unwrap();
-        (made, pixels.iter().map(|pixel| Vec3::from(pixel.map(f32::from))).collect::<Vec<Vec3>>())
+        (made, pixels.iter().map(|pixel| Vec3::from(pixel.map(scene::decode_srgb))).collect::<Vec<Vec3>>())
     };
     for scene in ["lamp.obj", "office.obj", "office_evening.toml", "cornell_box.obj", "blocker_plane.obj"] {
         let scene = data(&format!("scenes/{scene}"));
