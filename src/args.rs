@@ -43,6 +43,8 @@ pub enum Command {
     Shot(ShotFlags),
     /// Walk through the light in a window
     View(ViewFlags),
+    /// Write a page to walk through the light in a browser
+    Export(ExportFlags),
     /// Print the irradiance at points
     Probe(ProbeFlags),
     /// Hold a bake against an independent, path-traced reference
@@ -243,6 +245,24 @@ pub struct ViewFlags {
     /// The first point of view
     #[command(flatten)]
     pub camera: CameraFlags,
+}
+
+/// `halflight export`.
+#[derive(Debug, Args)]
+pub struct ExportFlags {
+    /// Bake to walk through, or a scene, which is baked first
+    #[arg(value_name = "SCENE|OUT.hlf")]
+    pub input: PathBuf,
+    /// How a scene is read
+    #[command(flatten)]
+    pub reading: SceneFlags,
+    /// Folder that the page goes to, for any server of files: a new or an empty one, or a page that was exported before, which is
+    /// replaced
+    #[arg(long, value_name = "OUT/")]
+    pub web: PathBuf,
+    /// Print one JSON object on stdout
+    #[arg(long)]
+    pub json: bool,
 }
 
 /// `halflight probe`.

@@ -7,6 +7,7 @@ mod artist;
 mod bake;
 mod compare;
 mod error_picture;
+mod export;
 mod failure;
 mod frame_timing;
 mod ground_truth;
@@ -16,6 +17,7 @@ mod interrupt;
 mod light_sources;
 mod memory;
 mod output;
+mod output_folder;
 mod pipeline;
 mod probe;
 mod progress;
@@ -76,6 +78,7 @@ fn run(command: Command) -> Result<Outcome> {
         Command::Bake(flags) => bake::run(&flags, &outputs, &interrupt),
         Command::Shot(flags) => shot::run(&flags, &outputs),
         Command::View(flags) => view::run(&flags, &outputs),
+        Command::Export(flags) => export::run(&flags, &outputs),
         Command::Probe(flags) => probe::run(&flags, &outputs),
         Command::Verify(flags) => verify::run(&flags, &outputs),
         Command::Info(flags) => info::run(&flags),

@@ -8,7 +8,7 @@ use scene::{Baked, Camera, Exposure, MIDDLE_GREY, NamedCamera, ToneCurve};
 use crate::{
     Frame, LightSource, Mode, PictureKind, Update,
     command::Command,
-    controls::{Flight, Steering, framing, overview},
+    controls::{ASKEW, Flight, Steering, framing, overview},
     hands::Drag,
     reading::Reading,
     twin::Twin,
@@ -132,11 +132,9 @@ impl Walk {
         if self.flight.is_none() {
             let aspect = f64::from(width.max(1)) / f64::from(height.max(1));
             let camera = self.first.or(scene.cameras.first().map(|named| named.camera));
-            let camera = camera.filter(Camera::is_valid).unwrap_or_else(|| {
-                let any =
-                    Camera { eye: DVec3::ZERO, target: DVec3::new(-1.0, 2.0, -0.5), up: DVec3::Z, vertical_fov: 1.0 };
-                overview(&shown.baked, &shown.twin.bvh, &any, aspect)
-            });
+            let camera = camera
+                .filter(Camera::is_valid)
+                .unwrap_or_else(|| overview(&shown.baked, &shown.twin.bvh, &ASKEW, aspect));
             self.flight = Some(Flight::new(camera, scene.size()));
         }
         // Its triangle may be gone, but its place is not.
