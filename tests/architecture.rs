@@ -15,7 +15,7 @@ const MAY_NAME: [(&str, &[&str]); 6] = [
 ];
 
 /// Crates of others that one of ours alone knows.
-const ONE_HOME: [(&str, &str); 11] = [
+const ONE_HOME: [(&str, &str); 12] = [
     ("obvhs", "scene"),
     ("tobj", "formats"),
     ("image", "formats"),
@@ -23,6 +23,7 @@ const ONE_HOME: [(&str, &str); 11] = [
     ("csv", "formats"),
     ("spade", "mesher"),
     ("wgpu", "viewer"),
+    ("naga", "viewer"),
     ("winit", "viewer"),
     ("egui", "viewer"),
     ("softbuffer", "viewer"),

@@ -123,11 +123,16 @@ fn texture_corner(place: u32) -> vec2<f32> {
 
 // A texel in linear light; columns and rows from -1 to the size repeat.
 fn texel(texels: u32, size: vec2<i32>, place: vec2<i32>) -> vec3<f32> {
-    let above = select(place, place - size, place >= size);
-    let inside = select(above, above + size, above < vec2(0));
-    let colour = texture_word(texels + u32(inside.y * size.x + inside.x));
+    let inside = wrapped(place.y, size.y) * size.x + wrapped(place.x, size.x);
+    let colour = texture_word(texels + u32(inside));
     let places = vec3(colour, colour >> 8u, colour >> 16u) & vec3(255u);
     return bitcast<vec3<f32>>(vec3(texture_word(places.x), texture_word(places.y), texture_word(places.z)));
+}
+
+// One by one: GLSL ES 3.00 selects no vectors of integers.
+fn wrapped(at: i32, size: i32) -> i32 {
+    let above = select(at, at - size, at >= size);
+    return select(above, above + size, above < 0);
 }
 
 // A colour that neighbouring ids do not share: the id hashed (Jarzynski and Olano 2020, "pcg").

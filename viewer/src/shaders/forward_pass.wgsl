@@ -2,6 +2,9 @@
 
 @group(0) @binding(0) var<uniform> frame: Frame;
 
+// Whether the API counts rows of pixels from below, as WebGL2 does.
+override ROWS_GO_UP: bool = false;
+
 struct Corner {
     @invariant @builtin(position) clip: vec4<f32>,
     @location(0) @interpolate(flat) triangle: u32,
@@ -17,11 +20,16 @@ fn corner(@builtin(vertex_index) index: u32) -> Corner {
 
 // Back sides are black.
 @fragment
-fn pixel(in: Corner, @builtin(front_facing) front: bool) -> @location(0) vec4<f32> {
+fn pixel(
+    @builtin(position) place: vec4<f32>,
+    @location(0) @interpolate(flat) triangle: u32,
+    @builtin(front_facing) front: bool
+) -> @location(0) vec4<f32> {
     if !front {
         return vec4(0.0, 0.0, 0.0, 1.0);
     }
-    let colour = colour_at(in.triangle, in.clip.xy);
+    let row = select(place.y, frame.size.y - place.y, ROWS_GO_UP);
+    let colour = colour_at(triangle, vec2(place.x, row));
     if frame.is_light == 1u {
         return vec4(encode_srgb(tone_curve(colour * frame.exposure)), 1.0);
     }

@@ -52,14 +52,14 @@ impl Translator {
 
     fn translate(&self, stage: ShaderStage, entry: &str, mode: Mode) -> String {
         const TRANSLATES: &str = "the source and its constants are ours, and a test translates all of them";
-        // A constant that a stage does not read is unknown to it.
-        let constants = [("MODE", f64::from(mode as u8)), ("TEXTURED", f64::from(u8::from(self.is_textured)))];
+        let textured = f64::from(u8::from(self.is_textured));
+        let constants = [("MODE", f64::from(mode as u8)), ("TEXTURED", textured), ("ROWS_GO_UP", 1.0)];
         let constants: PipelineConstants = constants.map(|(name, value)| (name.to_owned(), value)).into();
         let (module, info) =
             process_overrides(&self.module, &self.info, Some((stage, entry)), &constants).expect(TRANSLATES);
         let options = glsl::Options {
             version: glsl::Version::new_gles(300),
-            // The page draws to its own canvas, and knows which way the rows go.
+            // The page sets depths and rows right itself.
             writer_flags: glsl::WriterFlags::empty(),
             ..Default::default()
         };

@@ -27,22 +27,21 @@ export function isValid({ eye, target, up, fov }) {
  * What the shaders know of a frame: the uniform of `frame.wgsl`.
  *
  * @param {object} frame camera, width and height in pixels, ev, curve (its number), and whether the tone map exposes it (light)
- * @param {{near: number, reversed: boolean, rowsGoUp: boolean}} api distance of the near plane, metres; whether depth is 1 there
- *   and 0 far away, or goes from -1 to 1; whether the API counts rows of pixels from below
+ * @param {{near: number, reversed: boolean}} depth distance of the near plane, metres; whether depth is 1 there and 0 far away, or
+ *   goes from -1 to 1
  * @returns {ArrayBuffer}
  */
-export function uniform({ camera, width, height, ev, curve, light }, { near, reversed, rowsGoUp }) {
+export function uniform({ camera, width, height, ev, curve, light }, { near, reversed }) {
   const [right, up, forward] = axes(camera);
   const half = Math.tan((camera.fov * Math.PI) / 360);
-  const depth = reversed ? [0, 0, 0, near] : [...forward, -2 * near];
-  const rows = [[...scale(right, height / (half * width)), 0], [...scale(up, 1 / half), 0], depth, [...forward, 0]];
+  const depths = reversed ? [0, 0, 0, near] : [...forward, -2 * near];
+  const rows = [[...scale(right, height / (half * width)), 0], [...scale(up, 1 / half), 0], depths, [...forward, 0]];
   const buffer = new ArrayBuffer(144);
   const [numbers, words] = [new Float32Array(buffer), new Uint32Array(buffer)];
   for (let column = 0; column < 4; column++) numbers.set(rows.map((row) => row[column]), 4 * column);
   numbers.set([...camera.eye, height / (2 * half)], 16);
   numbers.set([...right, 2 ** ev], 20);
-  // The shaders count rows from above: where they are counted from below, the picture's own up is down.
-  numbers.set(rowsGoUp ? scale(up, -1) : up, 24);
+  numbers.set(up, 24);
   words[27] = light ? 1 : 0;
   numbers.set(forward, 28);
   words[31] = curve;

@@ -75,7 +75,8 @@ class Walk {
   #last = null;
   #isDue = false;
   #times = [];
-  #opened = -Infinity;
+  /** When a lost device was opened again last, milliseconds. */
+  #reopened = -Infinity;
 
   constructor(bake, api) {
     this.#bake = bake;
@@ -98,7 +99,6 @@ class Walk {
 
   /** Opens what draws; once more when it is lost. */
   async open() {
-    this.#opened = performance.now();
     const renderer = await openRenderer(this.#bake, this.#api);
     // Another mode may be asked for meanwhile.
     for (let mode = null; mode !== this.#mode; ) {
@@ -113,10 +113,11 @@ class Walk {
 
   async #reopen(why) {
     this.#renderer = null;
-    if (performance.now() - this.#opened < 1000 * LASTING) {
+    if (performance.now() - this.#reopened < 1000 * LASTING) {
       say(`The graphics device was lost again (${why}). Reload the page to try once more.`);
       return;
     }
+    this.#reopened = performance.now();
     say(`The graphics device was lost (${why}), and is opened again.`);
     await this.open().catch((error) => say(error.message));
   }

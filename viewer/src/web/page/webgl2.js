@@ -32,7 +32,7 @@ export async function openWebGl2(canvas, bake) {
   gl.enable(gl.DEPTH_TEST);
   gl.clearColor(0, 0, 0, 1);
 
-  const api = { near: NEAR * (bake.head.size || 1), reversed: false, rowsGoUp: true };
+  const depth = { near: NEAR * (bake.head.size || 1), reversed: false };
   const text = async (name) => (await fetched(new URL(`shaders/${name}`, bake.base))).text();
   const vertex = await text("corner.vert");
   const programs = new Map();
@@ -48,7 +48,7 @@ export async function openWebGl2(canvas, bake) {
     draw(frame) {
       gl.viewport(0, 0, frame.width, frame.height);
       gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
-      gl.bufferData(gl.UNIFORM_BUFFER, uniform(frame, api), gl.DYNAMIC_DRAW);
+      gl.bufferData(gl.UNIFORM_BUFFER, uniform(frame, depth), gl.DYNAMIC_DRAW);
       gl.useProgram(programs.get(frame.mode));
       gl.drawArrays(gl.TRIANGLES, 0, 3 * bake.head.triangles);
     },

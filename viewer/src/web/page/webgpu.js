@@ -4,9 +4,9 @@ import { fetched } from "./bake.js";
 import { uniform } from "./camera.js";
 
 /** Reversed infinite depth loses no precision by a near plane this close, metres: the one of the program's own window. */
-const API = { near: 1e-4, reversed: true, rowsGoUp: false };
+const DEPTH = { near: 1e-4, reversed: true };
 
-const DEPTH = "depth32float";
+const DEPTH_FORMAT = "depth32float";
 
 /** The arrays in the order of their bindings. */
 const ARRAYS = ["triangles", "elements", "corners", "textures"];
@@ -58,7 +58,7 @@ export async function openWebGpu(canvas, bake) {
         layout,
         vertex: { module, entryPoint: "corner" },
         fragment: { module, entryPoint: "pixel", constants, targets: [{ format }] },
-        depthStencil: { format: DEPTH, depthCompare: "greater", depthWriteEnabled: true },
+        depthStencil: { format: DEPTH_FORMAT, depthCompare: "greater", depthWriteEnabled: true },
       });
       pipelines.set(mode, pipeline);
     },
@@ -66,9 +66,9 @@ export async function openWebGpu(canvas, bake) {
       const size = [frame.width, frame.height];
       if (depth?.width !== frame.width || depth?.height !== frame.height) {
         depth?.destroy();
-        depth = device.createTexture({ size, format: DEPTH, usage: GPUTextureUsage.RENDER_ATTACHMENT });
+        depth = device.createTexture({ size, format: DEPTH_FORMAT, usage: GPUTextureUsage.RENDER_ATTACHMENT });
       }
-      device.queue.writeBuffer(frameBuffer, 0, uniform(frame, API));
+      device.queue.writeBuffer(frameBuffer, 0, uniform(frame, DEPTH));
       const encoder = device.createCommandEncoder();
       const pass = encoder.beginRenderPass({
         colorAttachments: [
