@@ -23,6 +23,8 @@ pub(crate) enum Command {
     CopyCamera,
     /// Writes a picture of the view.
     Save(PictureKind),
+    /// Records the camera's path, or ends that and writes it.
+    Record,
     /// Makes the picture brighter by so many stops.
     Brighten(f32),
     /// Meters the view, or keeps the exposure that it has.
@@ -72,7 +74,7 @@ const CAMERA_KEYS: [KeyCode; 9] = [
 ];
 
 /// What the keys do, as the window tells it.
-pub(crate) const KEYS: [(&str, &str); 17] = [
+pub(crate) const KEYS: [(&str, &str); 18] = [
     ("W A S D  Q E", "move; sink and rise"),
     ("Shift  Ctrl", "faster; slower"),
     ("left drag", "look around"),
@@ -88,6 +90,7 @@ pub(crate) const KEYS: [(&str, &str); 17] = [
     ("T", "next tone curve"),
     ("L", "lines to the sources"),
     ("P", "picture: PNG; with Shift, EXR"),
+    ("R", "record the path; write it"),
     ("Tab  H", "panels; these keys"),
     ("Esc", "close"),
 ];
@@ -108,6 +111,7 @@ impl Command {
             KeyCode::KeyC => Self::CopyCamera,
             KeyCode::KeyP if shift => Self::Save(PictureKind::Exr),
             KeyCode::KeyP => Self::Save(PictureKind::Png),
+            KeyCode::KeyR => Self::Record,
             KeyCode::BracketLeft => Self::Brighten(-STOPS),
             KeyCode::BracketRight => Self::Brighten(STOPS),
             KeyCode::KeyX => Self::ToggleMetering,

@@ -166,11 +166,15 @@ fn cameras(ui: &mut Ui, walk: &mut Walk, commands: &mut Vec<Command>) {
             ui.label(faint(format!("{:.2} m/s", flight.speed)));
         }
     });
+    if let Some(recording) = &walk.recording {
+        ui.label(RichText::new(format!("● {:.1} s recorded", recording.seconds())).color(Color32::LIGHT_RED));
+    }
     ui.horizontal(|ui| {
         let buttons = [
             ("camera", "copy the camera as flags of halflight shot: C", Command::CopyCamera),
             ("PNG", "picture as displayed: P", Command::Save(PictureKind::Png)),
             ("EXR", "picture of radiance: Shift P", Command::Save(PictureKind::Exr)),
+            ("path", "record the camera's path, and write it: R", Command::Record),
             ("keys", "H", Command::ToggleHelp),
         ];
         for (text, hover, command) in buttons {

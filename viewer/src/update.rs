@@ -3,7 +3,7 @@
 use std::sync::{Arc, mpsc::Receiver};
 
 use glam::DVec3;
-use scene::{Baked, Camera, Rgb};
+use scene::{Baked, Camera, CameraPath, Rgb};
 
 use crate::Frame;
 
@@ -66,6 +66,9 @@ pub type Explain = dyn Fn(&Arc<Baked>, SurfacePoint) -> Result<Vec<LightSource>,
 /// Writes a picture of a bake, and says where, or why not. Called on a thread of its own.
 pub type Save = dyn Fn(&Baked, &Frame, PictureKind) -> Result<String, String> + Send + Sync;
 
+/// Writes the path that a camera went, and says where, or why not. Called on a thread of its own.
+pub type SavePath = dyn Fn(&CameraPath) -> Result<String, String> + Send + Sync;
+
 /// What a window shows, and whom it asks.
 pub struct Walkthrough {
     /// What is shown, for the title.
@@ -76,6 +79,8 @@ pub struct Walkthrough {
     pub explain: Arc<Explain>,
     /// Writes pictures.
     pub save: Arc<Save>,
+    /// Writes paths.
+    pub save_path: Arc<SavePath>,
     /// Is told every notice, where windows and what they show are soon gone.
     pub tell: Box<dyn Fn(&str)>,
 }

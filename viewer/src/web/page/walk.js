@@ -251,6 +251,7 @@ class Walk {
 
 try {
   const bake = await fetchBake(new URL("./", import.meta.url), (part) => say(`${Math.round(100 * part)} % of the bake is here.`));
+  say("The picture is made ready.");
   await new Walk(bake, new URLSearchParams(location.search).get("api")).open();
 } catch (error) {
   say(error.message);
