@@ -11,6 +11,7 @@ use crate::{
     digits::{Number, colour, place},
     marks::{self, colour_of},
     pace::{PARTS, Pace},
+    recording::Recording,
     screen::Screen,
     walk::{Clicked, Walk},
 };
@@ -165,16 +166,17 @@ fn cameras(ui: &mut Ui, walk: &mut Walk, commands: &mut Vec<Command>) {
         if let Some(flight) = walk.flight {
             ui.label(faint(format!("{:.2} m/s", flight.speed)));
         }
+        let recorded = walk.recording.as_ref().map(Recording::seconds);
+        let text = recorded.map_or_else(|| "record".to_owned(), |seconds| format!("{seconds:.1} s recorded"));
+        if ui.selectable_label(recorded.is_some(), text).on_hover_text("the camera's path, into a file: R").clicked() {
+            commands.push(Command::Record);
+        }
     });
-    if let Some(recording) = &walk.recording {
-        ui.label(RichText::new(format!("● {:.1} s recorded", recording.seconds())).color(Color32::LIGHT_RED));
-    }
     ui.horizontal(|ui| {
         let buttons = [
             ("camera", "copy the camera as flags of halflight shot: C", Command::CopyCamera),
             ("PNG", "picture as displayed: P", Command::Save(PictureKind::Png)),
             ("EXR", "picture of radiance: Shift P", Command::Save(PictureKind::Exr)),
-            ("path", "record the camera's path, and write it: R", Command::Record),
             ("keys", "H", Command::ToggleHelp),
         ];
         for (text, hover, command) in buttons {
