@@ -1,4 +1,5 @@
-//! A folder that the program writes: checked before the work, there whole or not at all, and never over what somebody else put there.
+//! A folder that the program writes: checked before the work, there whole or not at all, and never over what somebody
+//! else put there.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -17,8 +18,8 @@ pub struct OutputFolder {
 }
 
 impl OutputFolder {
-    /// Checks that a folder can be made at `path`, without making it. What may be there already is an empty folder, or a page of
-    /// ours, whose head names every file in it.
+    /// Checks that a folder can be made at `path`, without making it. What may be there already is an empty folder, or
+    /// a page of ours, whose head names every file in it.
     pub fn claim(path: &Path, outputs: &Outputs) -> Result<Self> {
         // A link stays, and what it leads to is written.
         let path = path.canonicalize().unwrap_or_else(|_| path.to_owned());
@@ -34,8 +35,8 @@ impl OutputFolder {
                 foreign_files(&path).with_context(|| format!("{shown}: cannot be read; check its permissions"))?;
             if let Some(foreign) = foreign.first() {
                 bail!(
-                    "{shown}: holds {foreign}, which is no part of an exported page, and nothing of it shall be lost; name a \
-                     new folder or an empty one"
+                    "{shown}: holds {foreign}, which is no part of an exported page, and nothing of it shall be lost; \
+                     name a new folder or an empty one"
                 );
             }
         }

@@ -38,8 +38,8 @@ pub struct Report {
 }
 
 impl Browser {
-    /// Opens `page`, a text that is served as `/test.html`, among the files of a folder. Without a browser the test skips loudly, and
-    /// fails where HALFLIGHT_REQUIRE_BROWSER=1.
+    /// Opens `page`, a text that is served as `/test.html`, among the files of a folder. Without a browser the test
+    /// skips loudly, and fails where HALFLIGHT_REQUIRE_BROWSER=1.
     #[expect(clippy::print_stderr, reason = "a test that skips says so")]
     pub fn open(folder: &Path, page: &'static str) -> Option<Self> {
         let listener = TcpListener::bind("127.0.0.1:0").unwrap();

@@ -1,4 +1,5 @@
-//! The exported page in a real browser: by both of its APIs the pictures of the CPU's twin, and a walk by keys and mouse.
+//! The exported page in a real browser: by both of its APIs the pictures of the CPU's twin, and a walk by keys and
+//! mouse.
 
 use std::path::Path;
 
@@ -92,8 +93,9 @@ fn draws_what_the_cpu_draws(browser: &Browser, export: &Path, name: &str, modes:
             let cpu = twin.draw(&Frame { camera, width, height, mode, exposure, curve: ToneCurve::default() });
             let report = browser.report();
             assert_eq!(report.name, format!("{name}/{api}/{mode}"));
-            // A rasteriser may put corners on sixteenths of a pixel: which of two neighbours a pixel shows differs then. Where
-            // light is shown, which goes on from one to the other, that makes no difference; where triangles are, it does.
+            // A rasteriser may put corners on sixteenths of a pixel: which of two neighbours a pixel shows differs
+            // then. Where light is shown, which goes on from one to the other, that makes no difference; where
+            // triangles are, it does.
             let share = if mode.is_light() { 0.001 } else { 0.015 };
             is_the_same(&report.body, &cpu, share, &report.name);
         }
@@ -115,14 +117,15 @@ fn is_the_same(pixels: &[u8], cpu: &Picture, share: f64, what: &str) {
     );
 }
 
-/// The addresses at the start, after a key that walks forward was held, and after the mouse was dragged right by 100 pixels.
+/// The addresses at the start, after a key that walks forward was held, after the mouse was dragged right by 100
+/// pixels, then with the right button from the middle of the picture, and after two fingers walked forward.
 fn walks(addresses: &[String], size: f64) {
     let vector = |address: &String, name: &str| {
         let value = address.split(['#', '&']).find_map(|part| part.strip_prefix(&format!("{name}="))).unwrap();
         let numbers: Vec<f64> = value.split([',']).map(|number| number.parse().unwrap()).collect();
         DVec3::from_slice(&numbers)
     };
-    let [start, walked, turned] = addresses else { panic!("{addresses:?}") };
+    let [start, walked, turned, around, fingers] = addresses else { panic!("{addresses:?}") };
     let view = |address| vector(address, "target") - vector(address, "eye");
     let way = vector(walked, "eye") - vector(start, "eye");
     // Half a second at an eighth of the scene a second, or what a busy machine made of it.
@@ -133,4 +136,11 @@ fn walks(addresses: &[String], size: f64) {
     let angle = heading(walked).angle_between(heading(turned));
     assert!((angle - 0.1 * std::f64::consts::PI).abs() < 1e-3, "{addresses:?}: {angle}");
     assert!(heading(walked).cross(heading(turned)).z < 0.0, "to the right: {addresses:?}");
+    // Both views are of one point, as far away as before.
+    let [before, after] = [turned, around].map(|address| (vector(address, "eye"), view(address).normalize()));
+    let away = (before.0 - after.0).length() / (before.1 - after.1).length();
+    assert!((before.0 - after.0).length() > size / 100.0 && away > size / 10.0, "{addresses:?}");
+    assert!((before.0 + before.1 * away - after.0 - after.1 * away).length() < 0.01 * size, "{addresses:?}");
+    let way = vector(fingers, "eye") - vector(around, "eye");
+    assert!(way.length() > size / 100.0 && way.angle_between(view(around)) < 0.01, "{addresses:?}");
 }

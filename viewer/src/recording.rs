@@ -11,8 +11,8 @@ const SHORTEST: f64 = 1e-3;
 /// Metres within which a camera is where it was: what arithmetic makes of one that nobody moves.
 const SAME: f64 = 1e-9;
 
-/// How far a path may be off the walk: the eye, as a part of the scene's size, and the view, radians. A pixel or so in a picture of a
-/// thousand.
+/// How far a path may be off the walk: the eye, as a part of the scene's size, and the view, radians. A pixel or so in
+/// a picture of a thousand.
 const EYE_OFF: f64 = 5e-4;
 const VIEW_OFF: f64 = 1e-3;
 
@@ -47,9 +47,11 @@ impl Recording {
         self.keys.push(CameraKey { time, camera });
     }
 
-    /// The path, through no more cameras than it takes to keep to the walk in a scene of a size in metres; none where nothing moved.
+    /// The path, through no more cameras than it takes to keep to the walk in a scene of a size in metres; none where
+    /// nothing moved.
     ///
-    /// Beginning with both ends, the camera that the path misses most between two of its own is added to it, until it misses none.
+    /// Beginning with both ends, the camera that the path misses most between two of its own is added to it, until it
+    /// misses none.
     pub fn path(&self, scene_size: f64) -> Option<CameraPath> {
         let mut chosen = vec![0, self.keys.len() - 1];
         if chosen[1] == 0 {

@@ -1,7 +1,7 @@
 //! A page that walks through a bake in a browser: files that any server of files can serve, and nothing to build.
 //!
-//! The page is plain JavaScript; what it draws with are the shaders of the native passes ([`forward_pass`]), and what it draws are
-//! the same records, uploaded as they come.
+//! The page is plain JavaScript; what it draws with are the shaders of the native passes ([`forward_pass`]), and what
+//! it draws are the same records, uploaded as they come.
 
 mod forward_pass;
 mod head;
@@ -23,12 +23,13 @@ pub const BAKE_FILE: &str = "bake.hlf";
 const RECORDS_FILE: &str = "bake.bin";
 
 /// What is the same in every page.
-const PAGE: [(&str, &str); 8] = [
+const PAGE: [(&str, &str); 9] = [
     ("index.html", include_str!("web/page/index.html")),
     ("bake.js", include_str!("web/page/bake.js")),
     ("camera.js", include_str!("web/page/camera.js")),
     ("flight.js", include_str!("web/page/flight.js")),
     ("hands.js", include_str!("web/page/hands.js")),
+    ("pick.js", include_str!("web/page/pick.js")),
     ("walk.js", include_str!("web/page/walk.js")),
     ("webgl2.js", include_str!("web/page/webgl2.js")),
     ("webgpu.js", include_str!("web/page/webgpu.js")),

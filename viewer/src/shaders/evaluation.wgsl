@@ -1,8 +1,8 @@
-// The light at a point of the picture (Hardt & Teller, section 2.6), wherever the records are fetched from: the source before this
-// one says what `record`, `position`, `element` and `texture_word` are. `twin.rs` says the same in Rust.
+// The light at a point of the picture (Hardt & Teller, section 2.6), wherever the records are fetched from: the source
+// before this one says what `record`, `position`, `element` and `texture_word` are. `twin.rs` says the same in Rust.
 
-// Rows of a triangle's record (`records.rs`), four words each. The first three words are numbers: the coefficients of the
-// interpolant / pi, which is the radiance of a white surface; reflectance; emitted radiance.
+// Rows of a triangle's record (`records.rs`), four words each. The first three words are numbers: the coefficients of
+// the interpolant / pi, which is the radiance of a white surface; reflectance; emitted radiance.
 const A = 0u;
 const B2 = 1u;
 const C2 = 2u;
@@ -12,8 +12,8 @@ const F = 5u;
 const REFLECTANCE = 6u;
 const EMITTED = 7u;
 
-// Rows by their fourth word: the leaf element, the classes of the edges, and the texture's first word of texels (0 for no texture),
-// its width with its height in the upper half, and its first word of the corners' coordinates.
+// Rows by their fourth word: the leaf element, the classes of the edges, and the texture's first word of texels (0 for
+// no texture), its width with its height in the upper half, and its first word of the corners' coordinates.
 const ELEMENT = 0u;
 const EDGES = 1u;
 const TEXELS = 2u;
@@ -144,7 +144,8 @@ fn id_colour(id: u32) -> vec3<f32> {
     return 0.04 + 0.96 * vec3<f32>(vec3(hash, hash >> 8u, hash >> 16u) & vec3(255u)) / 255.0;
 }
 
-// Illuminance: ten stops around middle grey on a ramp of even lightness, with lines at 1, 2 and 5 times powers of ten lux.
+// Illuminance: ten stops around middle grey on a ramp of even lightness, with lines at 1, 2 and 5 times powers of ten
+// lux.
 fn false_color(id: u32, st: vec2<f32>, pixel: vec2<f32>) -> vec3<f32> {
     let here = luminance(id, st);
     let place = clamp(log2(here * frame.exposure / 0.18) / 10.0 + 0.5, 0.0, 1.0);

@@ -10,8 +10,8 @@ struct Corner {
     @location(0) @interpolate(flat) triangle: u32,
 }
 
-// Three corners a triangle, none shared: which of a triangle's corners a flat attribute is taken from differs between WebGPU and
-// WebGL2, and so all three say the same.
+// Three corners a triangle, none shared: which of a triangle's corners a flat attribute is taken from differs between
+// WebGPU and WebGL2, and so all three say the same.
 @vertex
 fn corner(@builtin(vertex_index) index: u32) -> Corner {
     // Relative to the eye first, so that the rounding of a far origin does not reach the picture.

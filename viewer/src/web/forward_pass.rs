@@ -1,7 +1,9 @@
-//! The shaders of the page: one pass from a bake's records to what a display shows, as WGSL for WebGPU and as GLSL ES 3.00 for WebGL2.
+//! The shaders of the page: one pass from a bake's records to what a display shows, as WGSL for WebGPU and as GLSL ES
+//! 3.00 for WebGL2.
 //!
-//! Both are made of the sources that the native passes are made of. WebGL2 has no storage buffers, so there records are fetched
-//! from pictures; and it has no constants that are set when a pipeline is made, so every mode is a shader of its own.
+//! Both are made of the sources that the native passes are made of. WebGL2 has no storage buffers, so there records are
+//! fetched from pictures; and it has no constants that are set when a pipeline is made, so every mode is a shader of
+//! its own.
 
 use naga::back::{PipelineConstants, glsl, pipeline_constants::process_overrides};
 use naga::{Module, ShaderStage, valid::ModuleInfo};

@@ -5,7 +5,7 @@
  *
  * @param {string|URL} base the page's folder, with a slash at its end
  * @param {(part: number) => void} [progress] is told the part that has arrived, 0 to 1
- * @returns {Promise<{head: object, base: string|URL} & Record<"triangles"|"elements"|"corners"|"textures", Uint32Array>>}
+ * @returns {Promise<object>} `head`, `base`, and the words of each array by its name
  */
 export async function fetchBake(base, progress = () => {}) {
   const head = await (await fetched(new URL("bake.json", base))).json();
@@ -16,7 +16,7 @@ export async function fetchBake(base, progress = () => {}) {
   for (;;) {
     const { done, value } = await reader.read();
     if (done) break;
-    if (arrived + value.length > length) throw new Error("bake.bin does not belong to bake.json: export the bake again");
+    if (arrived + value.length > length) throw new Error("bake.bin is not the one of bake.json: export the bake again");
     bytes.set(value, arrived);
     arrived += value.length;
     progress(arrived / length);

@@ -26,9 +26,10 @@ export function isValid({ eye, target, up, fov }) {
 /**
  * What the shaders know of a frame: the uniform of `frame.wgsl`.
  *
- * @param {object} frame camera, width and height in pixels, ev, curve (its number), and whether the tone map exposes it (light)
- * @param {{near: number, reversed: boolean}} depth distance of the near plane, metres; whether depth is 1 there and 0 far away, or
- *   goes from -1 to 1
+ * @param {object} frame camera, width and height in pixels, ev, curve (its number), and whether the tone map exposes it
+ *   (light)
+ * @param {{near: number, reversed: boolean}} depth distance of the near plane, metres; whether depth is 1 there and 0
+ *   far away, or goes from -1 to 1
  * @returns {ArrayBuffer}
  */
 export function uniform({ camera, width, height, ev, curve, light }, { near, reversed }) {
@@ -49,7 +50,9 @@ export function uniform({ camera, width, height, ev, curve, light }, { near, rev
   return buffer;
 }
 
-/** What an address says of a view: {camera, ev, mode, curve}, each undefined where it says nothing, or nothing valid. */
+/**
+ * What an address says of a view: {camera, ev, mode, curve}, each undefined where it says nothing, or nothing valid.
+ */
 export function fromAddress(hash) {
   const said = new URLSearchParams(hash.replace(/^#/, ""));
   const vector = (name) => said.get(name)?.split(",").map(Number);
@@ -73,6 +76,6 @@ export function fromAddress(hash) {
 export function toAddress({ camera, ev, mode, curve }) {
   const short = (x) => String(Number(x.toFixed(4)));
   const vector = (v) => v.map(short).join(",");
-  const { eye, target, up, fov } = camera;
-  return `#eye=${vector(eye)}&target=${vector(target)}&up=${vector(up)}&fov=${short(fov)}&ev=${short(ev)}&mode=${mode}&curve=${curve}`;
+  const vectors = ["eye", "target", "up"].map((name) => `${name}=${vector(camera[name])}`).join("&");
+  return `#${vectors}&fov=${short(camera.fov)}&ev=${short(ev)}&mode=${mode}&curve=${curve}`;
 }

@@ -1,9 +1,10 @@
 // The camera in the hand: where it is, what the hands do and how long, to where it is then.
 //
-// Speed follows the keys, and the view the mouse, with a lag that falls off exponentially. Both are solved in closed form, so that a
-// second is a second in however many frames. It is the motion of the program's own window (`controls.rs`), number for number.
+// Speed follows the keys, and the view the mouse, with a lag that falls off exponentially. Both are solved in closed
+// form, so that a second is a second in however many frames. It is the motion of the program's own window
+// (`controls.rs`), number for number.
 
-import { add, cross, dot, length, minus, scale, unit } from "./camera.js";
+import { add, axes, cross, dot, length, minus, scale, unit } from "./camera.js";
 
 /** Radians that the view turns per pixel of motion: half a turn across a screen of a thousand pixels. */
 const TURN_PER_PIXEL = Math.PI / 1000;
@@ -11,10 +12,10 @@ const TURN_PER_PIXEL = Math.PI / 1000;
 /** The steepest view up or down, radians: short of the vertical, where the picture would spin. */
 const STEEPEST = 0.49 * Math.PI;
 
-/** What Shift multiplies and Ctrl divides the speed by. */
+/** What haste multiplies and tarrying divides the speed by. */
 const HASTE = 4;
 
-/** What one notch of the wheel multiplies the speed by. */
+/** What one notch of the wheel multiplies the speed by; around a point it divides the distance. */
 const SPEED_PER_NOTCH = 1.25;
 
 /** Seconds in which a scene is crossed, along its diagonal, at the speed that a flight starts with. */
@@ -30,7 +31,7 @@ const TURNED = 1e-5;
 
 /** A camera at rest in a scene of a size in metres. */
 export function atRest(camera, sceneSize) {
-  return { camera, speed: (sceneSize || 1) / CROSSING, velocity: [0, 0, 0], turning: [0, 0] };
+  return { camera, speed: (sceneSize || 1) / CROSSING, velocity: [0, 0, 0], turning: [0, 0], around: null };
 }
 
 /** The same flight, at rest at another camera. */
@@ -47,23 +48,41 @@ export function isStill({ velocity, turning }) {
  * Where a flight is `seconds` later.
  *
  * @param {object} flight as {@link atRest} makes it
- * @param {object} steering motion to the right, along the scene's up, and forward, each -1 to 1; look, pixels to the right and down;
- *   wheel, notches away from the hand; fast and slow
+ * @param {object} steering motion to the right, along the scene's up, and forward, each -1 to 1; look, pixels to the
+ *   right and down; wheel, notches away from the hand; fast and slow; around, the point that the look goes around, if
+ *   it goes around one
  */
 export function step(flight, steering, seconds) {
-  const speed = flight.speed * SPEED_PER_NOTCH ** steering.wheel;
-  return glide(turn({ ...flight, speed }, steering.look, seconds), steering, seconds);
+  const quicker = SPEED_PER_NOTCH ** steering.wheel;
+  const begun = steering.around
+    ? { ...flight, camera: nearer(flight.camera, steering.around, 1 - 1 / quicker) }
+    : { ...flight, speed: flight.speed * quicker };
+  return glide(turn(begun, steering, seconds), steering, seconds);
 }
 
-function turn(flight, look, seconds) {
+/** A camera that is nearer to a point by a part of the distance. */
+function nearer(camera, point, part) {
+  const way = scale(minus(point, camera.eye), part);
+  return { ...camera, eye: add(camera.eye, way), target: add(camera.target, way) };
+}
+
+/** Follows the mouse, in place or around a point. */
+function turn(flight, { look, around: asked }, seconds) {
+  const around = length(look) > 0 ? asked : flight.around;
   const wanted = add(flight.turning, scale(look, TURN_PER_PIXEL));
   const lag = Math.exp(-seconds / LOOK_LAG);
   const left = length(wanted) * lag < TURNED ? [0, 0] : scale(wanted, lag);
   const now = minus(wanted, left);
-  if (length(now) === 0) return { ...flight, turning: left };
+  const followed = { ...flight, turning: left, around };
+  if (length(now) === 0) return followed;
   const { eye, target, up } = flight.camera;
   const forward = turned(minus(target, eye), unit(up), now);
-  return { ...flight, turning: left, camera: { ...flight.camera, target: add(eye, forward) } };
+  const camera = { ...flight.camera, target: add(eye, forward) };
+  if (!around) return { ...followed, camera };
+  // The point stays where it is in the camera's axes, and so in the picture.
+  const place = axes(flight.camera).map((axis) => dot(axis, minus(eye, around)));
+  const moved = axes(camera).reduce((point, axis, i) => add(point, scale(axis, place[i])), around);
+  return { ...followed, camera: { ...camera, eye: moved, target: add(moved, forward) } };
 }
 
 /** A view direction after turning to the right about `up` and down, radians; its length is kept. */

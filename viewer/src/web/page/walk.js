@@ -4,6 +4,7 @@ import { fetchBake } from "./bake.js";
 import { fromAddress, toAddress } from "./camera.js";
 import { at, atRest, isStill, step } from "./flight.js";
 import { Hands } from "./hands.js";
+import { pointAt } from "./pick.js";
 import { openWebGl2 } from "./webgl2.js";
 import { openWebGpu } from "./webgpu.js";
 
@@ -51,11 +52,9 @@ async function openRenderer(bake, wanted) {
       reasons.push(`${name}: ${error.message}`);
     }
   }
-  throw new Error(
-    reasons.length
-      ? `The walk needs WebGPU or WebGL2: ${reasons.join("; ")}. Another browser may have one, or its settings may allow graphics acceleration.`
-      : `?api=${wanted} is neither webgpu nor webgl2.`,
-  );
+  if (reasons.length === 0) throw new Error(`?api=${wanted} is neither webgpu nor webgl2.`);
+  const cure = "Another browser may have one, or this one's settings may allow graphics acceleration.";
+  throw new Error(`The walk needs WebGPU or WebGL2: ${reasons.join("; ")}. ${cure}`);
 }
 
 /** A walk through a bake, from what the page's address says of it. */
@@ -68,6 +67,8 @@ class Walk {
   #ev;
   /** Whether the exposure is one's own, and not the camera's. */
   #evIsOwn;
+  /** The point that is gone around while the right button is held. */
+  #pivot = null;
   #mode = 0;
   #curve = 0;
   #size = [0, 0];
@@ -141,6 +142,7 @@ class Walk {
     choice("curve", head.curves, (number) => this.#bend(number));
     Object.assign(element("ev"), { min: ev - STOPS, max: ev + STOPS, step: 0.1 });
     element("ev").addEventListener("input", () => this.#expose(Number(element("ev").value)));
+    element("ev").addEventListener("change", () => element("ev").blur());
   }
 
   /** Goes where an address says. */
@@ -206,7 +208,8 @@ class Walk {
     this.#isDue = false;
     const seconds = this.#last === null ? 0 : Math.min((now - this.#last) / 1000, LONGEST_STEP);
     const steering = this.#hands.take();
-    this.#flight = step(this.#flight, steering, seconds);
+    this.#pivot = steering.orbit && (this.#pivot ?? this.#pointAt(steering.orbit));
+    this.#flight = step(this.#flight, { ...steering, around: this.#pivot }, seconds);
     this.#draw();
     if (this.#last !== null) this.#times = [...this.#times.slice(1 - FRAMES), now - this.#last];
     const moves = steering.motion.some((way) => way !== 0) || !isStill(this.#flight);
@@ -214,6 +217,14 @@ class Walk {
     this.#tell();
     if (moves) this.#wake();
     else history.replaceState(null, "", toAddress(this.#view()));
+  }
+
+  /** What is seen at a place of the page. */
+  #pointAt([x, y]) {
+    const { corners, head } = this.#bake;
+    const { clientWidth: width, clientHeight: height } = element("stage");
+    const numbers = new Float32Array(corners.buffer, corners.byteOffset, corners.length);
+    return pointAt(numbers, this.#flight.camera, [x / width, y / height], width / height, head.size / 2);
   }
 
   #draw() {
@@ -239,18 +250,20 @@ class Walk {
     element("curve").value = this.#curve;
     element("ev").value = this.#ev;
     element("stops").textContent = this.#ev.toFixed(1);
-    const { eye } = this.#flight.camera;
     // A list that shows no camera says that one is at none.
-    element("camera").selectedIndex = [...head.cameras, head.overview].findIndex((camera) => String(camera.eye) === String(eye));
+    const isHere = ({ eye }) => String(eye) === String(this.#flight.camera.eye);
+    element("camera").selectedIndex = [...head.cameras, head.overview].findIndex(isHere);
     const median = [...this.#times].sort((a, b) => a - b)[this.#times.length >> 1];
     const times = median ? `, ${median.toFixed(1)} ms a frame` : "";
-    element("status").textContent =
-      `${head.triangles.toLocaleString("en")} triangles, error ${(100 * head.error[0]).toFixed(2)} %; ${this.#renderer?.name ?? "nothing"} draws${times}`;
+    const [triangles, error] = [head.triangles.toLocaleString("en"), (100 * head.error[0]).toFixed(2)];
+    const api = this.#renderer?.name ?? "nothing";
+    element("status").textContent = `${triangles} triangles, error ${error} %; ${api} draws${times}`;
   }
 }
 
 try {
-  const bake = await fetchBake(new URL("./", import.meta.url), (part) => say(`${Math.round(100 * part)} % of the bake is here.`));
+  const progress = (part) => say(`${Math.round(100 * part)} % of the bake is here.`);
+  const bake = await fetchBake(new URL("./", import.meta.url), progress);
   say("The picture is made ready.");
   await new Walk(bake, new URLSearchParams(location.search).get("api")).open();
 } catch (error) {

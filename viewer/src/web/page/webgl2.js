@@ -1,4 +1,5 @@
-// The walk's pictures by WebGL2, where there is no WebGPU: the bake in pictures of numbers, and a program for every mode.
+// The walk's pictures by WebGL2, where there is no WebGPU: the bake in pictures of numbers, and a program for every
+// mode.
 
 import { fetched } from "./bake.js";
 import { uniform } from "./camera.js";
@@ -7,8 +8,8 @@ import { uniform } from "./camera.js";
 const WIDTH = 2048;
 
 /**
- * Depth of 24 bits from a near plane at this part of the scene's size: nearer, walls at its far end would be told apart by less than
- * their distance; farther, one would see through what one stands before.
+ * Depth of 24 bits from a near plane at this part of the scene's size: nearer, walls at its far end would be told apart
+ * by less than their distance; farther, one would see through what one stands before.
  */
 const NEAR = 1e-3;
 

@@ -3,10 +3,15 @@
 import { fetched } from "./bake.js";
 import { uniform } from "./camera.js";
 
-/** Reversed infinite depth loses no precision by a near plane this close, metres: the one of the program's own window. */
+/**
+ * Reversed infinite depth loses no precision by a near plane this close, metres: the one of the program's own window.
+ */
 const DEPTH = { near: 1e-4, reversed: true };
 
 const DEPTH_FORMAT = "depth32float";
+
+/** Bytes of a storage buffer that every adapter takes. */
+const DEFAULT_ROOM = 1 << 27;
 
 /** The arrays in the order of their bindings. */
 const ARRAYS = ["triangles", "elements", "corners", "textures"];
@@ -14,8 +19,8 @@ const ARRAYS = ["triangles", "elements", "corners", "textures"];
 /**
  * Brings a bake to the adapter that draws on a canvas; null where there is none.
  *
- * What comes back has `draw(frame)` for frames in modes for which `prepare(mode)` has been waited, and tells in `lost` when and why it
- * can draw no more.
+ * What comes back has `draw(frame)` for frames in modes for which `prepare(mode)` has been waited, and tells in `lost`
+ * when and why it can draw no more.
  */
 export async function openWebGpu(canvas, bake) {
   const adapter = await navigator.gpu?.requestAdapter({ powerPreference: "high-performance" });
@@ -23,9 +28,8 @@ export async function openWebGpu(canvas, bake) {
   const largest = Math.max(...ARRAYS.map((name) => bake[name].byteLength));
   const room = Math.min(adapter.limits.maxStorageBufferBindingSize, adapter.limits.maxBufferSize);
   if (largest > room) throw new Error(`the bake takes ${largest} bytes in one piece, and this adapter holds ${room}`);
-  const device = await adapter.requestDevice({
-    requiredLimits: { maxStorageBufferBindingSize: Math.max(largest, 1 << 27), maxBufferSize: Math.max(largest, 1 << 28) },
-  });
+  const requiredLimits = largest > DEFAULT_ROOM ? { maxStorageBufferBindingSize: largest, maxBufferSize: largest } : {};
+  const device = await adapter.requestDevice({ requiredLimits });
   const format = navigator.gpu.getPreferredCanvasFormat();
   const context = canvas.getContext("webgpu");
   context.configure({ device, format, alphaMode: "opaque" });
@@ -41,7 +45,8 @@ export async function openWebGpu(canvas, bake) {
     }),
   ];
   const frameBuffer = device.createBuffer({ size: 144, usage: GPUBufferUsage.UNIFORM | GPUBufferUsage.COPY_DST });
-  const groups = [group(device, layouts[0], [frameBuffer]), group(device, layouts[1], ARRAYS.map((name) => upload(device, bake[name])))];
+  const buffers = ARRAYS.map((name) => upload(device, bake[name]));
+  const groups = [group(device, layouts[0], [frameBuffer]), group(device, layouts[1], buffers)];
   const failed = await device.popErrorScope();
   if (failed) throw new Error(`the graphics memory is full: ${failed.message}`);
 
@@ -70,11 +75,15 @@ export async function openWebGpu(canvas, bake) {
       }
       device.queue.writeBuffer(frameBuffer, 0, uniform(frame, DEPTH));
       const encoder = device.createCommandEncoder();
+      const view = context.getCurrentTexture().createView();
       const pass = encoder.beginRenderPass({
-        colorAttachments: [
-          { view: context.getCurrentTexture().createView(), loadOp: "clear", clearValue: [0, 0, 0, 1], storeOp: "store" },
-        ],
-        depthStencilAttachment: { view: depth.createView(), depthLoadOp: "clear", depthClearValue: 0, depthStoreOp: "discard" },
+        colorAttachments: [{ view, loadOp: "clear", clearValue: [0, 0, 0, 1], storeOp: "store" }],
+        depthStencilAttachment: {
+          view: depth.createView(),
+          depthLoadOp: "clear",
+          depthClearValue: 0,
+          depthStoreOp: "discard",
+        },
       });
       pass.setPipeline(pipelines.get(frame.mode));
       groups.forEach((group, index) => pass.setBindGroup(index, group));
