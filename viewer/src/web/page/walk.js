@@ -34,8 +34,8 @@ function say(what) {
   element("message").hidden = !what;
 }
 
-/** What can draw a bake: the API that is asked for, else WebGPU where there is one, else WebGL2. */
-async function openRenderer(bake, wanted) {
+/** What can draw a bake in a mode: the API that is asked for, else WebGPU where there is one, else WebGL2. */
+async function openRenderer(bake, wanted, mode) {
   const reasons = [];
   for (const [name, open] of [["webgpu", openWebGpu], ["webgl2", openWebGl2]]) {
     if (wanted && wanted !== name) continue;
@@ -44,6 +44,7 @@ async function openRenderer(bake, wanted) {
     try {
       const renderer = await open(canvas, bake);
       if (renderer) {
+        await renderer.prepare(mode);
         element("stage").replaceChildren(canvas);
         return { ...renderer, canvas };
       }
@@ -100,16 +101,15 @@ class Walk {
 
   /** Opens what draws; once more when it is lost. */
   async open() {
-    const renderer = await openRenderer(this.#bake, this.#api);
-    // Another mode may be asked for meanwhile.
-    for (let mode = null; mode !== this.#mode; ) {
-      mode = this.#mode;
-      await renderer.prepare(mode);
-    }
+    const mode = this.#mode;
+    const renderer = await openRenderer(this.#bake, this.#api, mode);
+    const asked = this.#mode;
+    this.#mode = mode;
     this.#renderer = renderer;
     renderer.lost.then((why) => this.#reopen(why));
     say("");
-    this.#wake();
+    // Another mode may have been asked for meanwhile.
+    await this.#show(asked);
   }
 
   async #reopen(why) {
@@ -177,11 +177,14 @@ class Walk {
   }
 
   async #show(mode) {
+    const renderer = this.#renderer;
     try {
-      await this.#renderer?.prepare(mode);
+      await renderer?.prepare(mode);
     } catch (error) {
       return say(error.message);
     }
+    // What draws now may not be what was asked.
+    if (renderer !== this.#renderer) return this.#show(mode);
     this.#mode = mode;
     this.#wake();
   }
