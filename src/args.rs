@@ -49,6 +49,8 @@ pub enum Command {
     Render(RenderFlags),
     /// Walk through the light in a window
     View(ViewFlags),
+    /// Write a page to walk through the light in a browser
+    Export(ExportFlags),
     /// Print the irradiance at points
     Probe(ProbeFlags),
     /// Hold a bake against an independent, path-traced reference
@@ -249,9 +251,27 @@ pub struct ViewFlags {
     /// The first point of view
     #[command(flatten)]
     pub camera: CameraFlags,
-    /// What the picture is refined with while the view rests (key R)
+    /// What the picture is refined with while the view rests (key V)
     #[command(flatten)]
     pub radiance: RadianceFlags,
+}
+
+/// `halflight export`.
+#[derive(Debug, Args)]
+pub struct ExportFlags {
+    /// Bake to walk through, or a scene, which is baked first
+    #[arg(value_name = "SCENE|OUT.hlf")]
+    pub input: PathBuf,
+    /// How a scene is read
+    #[command(flatten)]
+    pub reading: SceneFlags,
+    /// Folder that the page goes to, for any server of files: a new or an empty one, or a page that was exported before, which is
+    /// replaced
+    #[arg(long, value_name = "OUT/")]
+    pub web: PathBuf,
+    /// Print one JSON object on stdout
+    #[arg(long)]
+    pub json: bool,
 }
 
 /// `halflight probe`.

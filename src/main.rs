@@ -7,6 +7,7 @@ mod artist;
 mod bake;
 mod compare;
 mod error_picture;
+mod export;
 mod failure;
 mod frame_timing;
 mod ground_truth;
@@ -16,6 +17,7 @@ mod interrupt;
 mod light_sources;
 mod memory;
 mod output;
+mod output_folder;
 mod picture;
 mod pipeline;
 mod point_gather;
@@ -82,6 +84,7 @@ fn run(command: Command) -> Result<Outcome> {
         Command::Shot(flags) => shot::run(&flags, &outputs),
         Command::Render(flags) => render::run(&flags, &outputs, &interrupt),
         Command::View(flags) => view::run(&flags, &outputs),
+        Command::Export(flags) => export::run(&flags, &outputs),
         Command::Probe(flags) => probe::run(&flags, &outputs),
         Command::Verify(flags) => verify::run(&flags, &outputs),
         Command::Info(flags) => info::run(&flags),

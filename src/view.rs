@@ -8,7 +8,7 @@ use std::thread::JoinHandle;
 
 use anyhow::{Context, Result};
 use rayon::ThreadPoolBuilder;
-use scene::{Baked, Scene};
+use scene::{Baked, CameraPath, Scene};
 use viewer::{Frame, Mode, PictureKind, Update, Walkthrough, WindowSystem};
 
 use crate::args::{Backend, LightFlags, SceneFlags, ViewFlags, Viewpoint};
@@ -17,7 +17,7 @@ use crate::bake::missed;
 use crate::failure::{Outcome, Usage, sentence};
 use crate::input::{Input, bake_once, read_scene, require_light};
 use crate::light_sources::LightSources;
-use crate::output::Outputs;
+use crate::output::{Output, Outputs};
 use crate::pipeline::Onlooker;
 use crate::progress::say;
 use crate::radiance;
@@ -65,6 +65,7 @@ fn walkthrough(flags: &ViewFlags, updates: Receiver<Update>, outputs: Outputs) -
     let name = flags.input.file_name().unwrap_or(flags.input.as_os_str()).to_string_lossy();
     let (sources, input, radiance) = (Arc::new(LightSources::default()), flags.input.clone(), flags.radiance);
     let sources_of_pictures = sources.clone();
+    let paths = (input.clone(), outputs.clone());
     Walkthrough {
         name: format!("{name} – Halflight"),
         updates,
@@ -75,6 +76,7 @@ fn walkthrough(flags: &ViewFlags, updates: Receiver<Update>, outputs: Outputs) -
         refine: Arc::new(move |baked, frame, wanted, show| {
             refine(baked, &sources_of_pictures, frame, radiance, wanted, show).map_err(|error| sentence(&error))
         }),
+        save_path: Arc::new(move |path| save_path(path, &paths.0, &paths.1).map_err(|error| sentence(&error))),
         tell: Box::new(|what| say(what)),
     }
 }
@@ -162,18 +164,30 @@ fn bake_before(
     Ok(())
 }
 
-/// Draws a frame as `shot` does, and writes it beside where the program was started, under the first name that is free; says where.
-fn save(baked: &Baked, frame: &Frame, kind: PictureKind, input: &Path, outputs: &Outputs) -> Result<String> {
+/// Claims a file of the input's name where the program was started, under the first number that is free.
+fn claim_next(input: &Path, kind: &str, end: &str, outputs: &Outputs) -> Result<Output> {
     let stem = input.file_stem().unwrap_or(input.as_os_str()).to_string_lossy();
+    let names = (1..=u32::MAX).map(|number| PathBuf::from(format!("{stem}{kind}-{number}.{end}")));
+    outputs.claim(&names.into_iter().find(|path| !path.exists()).context("every name is taken")?)
+}
+
+/// Writes a path for `shot --path`; says where.
+fn save_path(path: &CameraPath, input: &Path, outputs: &Outputs) -> Result<String> {
+    let output = claim_next(input, "-path", "toml", outputs)?;
+    output.write(|file| formats::write_camera_path(file, path))?;
+    let ((first, last), cameras) = (path.times(), path.keys().len());
+    Ok(format!("{} is written: {cameras} cameras, {:.1} s", output.path().display(), last - first))
+}
+
+/// Draws a frame as `shot` does, and writes it; says where.
+fn save(baked: &Baked, frame: &Frame, kind: PictureKind, input: &Path, outputs: &Outputs) -> Result<String> {
     let end = if kind == PictureKind::Exr { "exr" } else { "png" };
-    let names = (1..=u32::MAX).map(|number| PathBuf::from(format!("{stem}-{number}.{end}")));
-    let path = names.into_iter().find(|path| !path.exists()).context("every name is taken")?;
-    let output = outputs.claim(&path)?;
+    let output = claim_next(input, "", end, outputs)?;
     let studio = Studio::open(baked, Backend::Auto)?;
     let mut picture = studio.artist((frame.width, frame.height))?.draw(frame, kind == PictureKind::Exr)?;
     if frame.mode == Mode::FalseColor {
         picture.add_legend();
     }
     shot::write(&picture, &output)?;
-    Ok(format!("{} is written, EV {:.3}", path.display(), picture.exposure.ev))
+    Ok(format!("{} is written, EV {:.3}", output.path().display(), picture.exposure.ev))
 }

@@ -15,7 +15,7 @@ const MAY_NAME: [(&str, &[&str]); 6] = [
 ];
 
 /// Crates of others, and those of ours that alone know them: one, but for the triangulation of surfaces and of the image plane.
-const HOMES: [(&str, &[&str]); 11] = [
+const HOMES: [(&str, &[&str]); 12] = [
     ("obvhs", &["scene"]),
     ("tobj", &["formats"]),
     ("image", &["formats"]),
@@ -23,6 +23,7 @@ const HOMES: [(&str, &[&str]); 11] = [
     ("csv", &["formats"]),
     ("spade", &["mesher", "renderer"]),
     ("wgpu", &["viewer"]),
+    ("naga", &["viewer"]),
     ("winit", &["viewer"]),
     ("egui", &["viewer"]),
     ("softbuffer", &["viewer"]),

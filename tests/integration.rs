@@ -6,6 +6,7 @@
 
 mod analytic;
 mod architecture;
+mod browser;
 mod cli;
 mod closed_forms;
 mod continuity;
@@ -31,4 +32,5 @@ mod robustness;
 mod smooth_shading;
 mod textures;
 mod verify;
+mod web;
 mod window;

@@ -32,7 +32,7 @@ fn every_command_is_run_by_ci() {
 #[test]
 fn every_subcommand_is_explained() {
     let readme = read("README.md");
-    for subcommand in ["bake", "shot", "render", "view", "probe", "verify", "info", "validate"] {
+    for subcommand in ["bake", "shot", "render", "view", "export", "probe", "verify", "info", "validate"] {
         assert!(readme.contains(&format!("`halflight {subcommand}")), "{subcommand}");
         let help = crate::fixture::run(&[subcommand, "--help"]);
         assert!(!help.stdout.is_empty() && help.stderr.is_empty());

@@ -11,7 +11,7 @@ use viewer::{Frame, Mode, draw_on_cpu};
 use crate::fixture::{box_faces, folder, probe, run, text, write_points};
 
 /// A room of 4 × 3 × 2.5 m with a lamp below its ceiling; the floor, z = 0, is of the material given.
-fn room(folder: &Path, floor: &str) -> PathBuf {
+pub fn room(folder: &Path, floor: &str) -> PathBuf {
     let materials = format!("newmtl wall\nKd 0.6 0.5 0.4\nnewmtl lamp\nKd 0\nKe 20 20 20\nnewmtl floor\n{floor}\n");
     std::fs::write(folder.join("room.mtl"), materials).unwrap();
     let size = DVec3::new(4.0, 3.0, 2.5);

@@ -93,6 +93,18 @@ fn the_window_shows_what_shot_draws_wherever_one_goes() {
     let picture = folder.path().join("again.exr");
     let compare = ["--compare", text(&reference), "--max-error", "0.01", "--mode", "gouraud"];
     run(&[&["shot", text(office()), "-o", text(&picture), "--size", "640x480"], &compare[..], &flags].concat());
+    // A walk that is recorded ends where the window is, and is drawn from its file.
+    window.keys(&["F3", "r"]);
+    window.wait_until_said("is recorded");
+    window.tool(&["keydown", "s", "sleep", "0.4", "keyup", "s"]);
+    let end = window.picture_at_rest(folder.path());
+    window.keys(&["r"]);
+    window.wait_until_said("office-path-1.toml is written");
+    let (path, walked) = (folder.path().join("office-path-1.toml"), folder.path().join("walk.png"));
+    let flags = ["--path", text(&path), "--frames", "2", "--mode", "ids"];
+    run(&[&["shot", text(office()), "-o", text(&walked), "--size", "640x480"], &flags[..]].concat());
+    let last = formats::read_png(&folder.path().join("walk.0002.png")).unwrap().2;
+    assert_alike(&last, &end, "the end of the path");
     // Back to where it began.
     window.keys(&["F1", "t", "1"]);
     assert_alike(&window.picture_at_rest(folder.path()), &first, "the first camera, visited");
@@ -140,7 +152,7 @@ fn a_view_at_rest_is_refined() {
     window.wait_until_said("cornell_box-1.png is written, EV ");
     let said = window.said();
     let ev = said.split("EV ").nth(1).unwrap().split_whitespace().next().unwrap();
-    window.keys(&["r"]);
+    window.keys(&["v"]);
     window.wait_until_said("refined: every pixel is known");
     let seen = window.picture_at_rest(folder.path());
     let rendered = folder.path().join("rendered.png");
@@ -152,7 +164,7 @@ fn a_view_at_rest_is_refined() {
         share_off(&rendered, &shot(cornell_box(), folder.path(), &["--exposure", ev])) > 4.0 * SHARE,
         "edges are smooth"
     );
-    window.keys(&["r"]);
+    window.keys(&["v"]);
     shows_what_shot_draws(&mut window, cornell_box(), folder.path(), &["--exposure", ev]);
     assert_eq!(window.close(), Some(0));
 }
@@ -274,6 +286,7 @@ fn fifty_windows_one_after_another() {
             explain: Arc::new(|_, _| Ok(Vec::new())),
             save: Arc::new(|_, _, _| Ok(String::new())),
             refine: Arc::new(|_, _, _, _| Ok(())),
+            save_path: Arc::new(|_| Ok(String::new())),
             tell: Box::new(|_| ()),
         };
         system.open(walkthrough).unwrap();

@@ -25,6 +25,8 @@ pub(crate) enum Command {
     Save(PictureKind),
     /// Refines the picture while the view rests, or not.
     ToggleRefinement,
+    /// Records the camera's path, or ends that and writes it.
+    Record,
     /// Makes the picture brighter by so many stops.
     Brighten(f32),
     /// Meters the view, or keeps the exposure that it has.
@@ -74,7 +76,7 @@ const CAMERA_KEYS: [KeyCode; 9] = [
 ];
 
 /// What the keys do, as the window tells it.
-pub(crate) const KEYS: [(&str, &str); 18] = [
+pub(crate) const KEYS: [(&str, &str); 19] = [
     ("W A S D  Q E", "move; sink and rise"),
     ("Shift  Ctrl", "faster; slower"),
     ("left drag", "look around"),
@@ -89,8 +91,9 @@ pub(crate) const KEYS: [(&str, &str); 18] = [
     ("[  ]  X", "darker; brighter; metered"),
     ("T", "next tone curve"),
     ("L", "lines to the sources"),
-    ("R", "refine the picture at rest"),
+    ("V", "refine the picture at rest"),
     ("P", "picture: PNG; with Shift, EXR"),
+    ("R", "record the path; write it"),
     ("Tab  H", "panels; these keys"),
     ("Esc", "close"),
 ];
@@ -109,9 +112,10 @@ impl Command {
             KeyCode::KeyF => Self::Frame,
             KeyCode::KeyO => Self::ToggleOrbit,
             KeyCode::KeyC => Self::CopyCamera,
-            KeyCode::KeyR => Self::ToggleRefinement,
+            KeyCode::KeyV => Self::ToggleRefinement,
             KeyCode::KeyP if shift => Self::Save(PictureKind::Exr),
             KeyCode::KeyP => Self::Save(PictureKind::Png),
+            KeyCode::KeyR => Self::Record,
             KeyCode::BracketLeft => Self::Brighten(-STOPS),
             KeyCode::BracketRight => Self::Brighten(STOPS),
             KeyCode::KeyX => Self::ToggleMetering,

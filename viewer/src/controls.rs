@@ -37,6 +37,10 @@ const TURNED: f64 = 1e-5;
 const BEYOND: f64 = 0.01;
 const WALLS: u32 = 8;
 
+/// Where a walk begins that nobody has given a camera, before [`overview`] brings the scene into its picture: it looks down askew.
+pub const ASKEW: Camera =
+    Camera { eye: DVec3::ZERO, target: DVec3::new(-1.0, 2.0, -0.5), up: DVec3::Z, vertical_fov: 1.0 };
+
 /// A camera in flight.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Flight {

@@ -5,8 +5,12 @@ use std::sync::OnceLock;
 use crate::{Mode, gpu::bind_group};
 
 /// Source of the shader.
-pub(crate) const SHADER: &str =
-    concat!(include_str!("shaders/frame.wgsl"), include_str!("shaders/interpolant_pass.wgsl"));
+pub(crate) const SHADER: &str = concat!(
+    include_str!("shaders/frame.wgsl"),
+    include_str!("shaders/record_buffers.wgsl"),
+    include_str!("shaders/evaluation.wgsl"),
+    include_str!("shaders/interpolant_pass.wgsl")
+);
 
 /// Side of the square of pixels that a workgroup takes; the shader says the same.
 const WORKGROUP: u32 = 8;

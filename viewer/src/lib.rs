@@ -5,7 +5,8 @@
 //! its triangle's quadratic interpolant, L = ρE/π + Ke. (d): exposure, tone curve, display. [`draw_on_gpu`] runs the
 //! passes on a graphics adapter, [`draw_on_cpu`] is their twin on the host, where rays fill the visibility buffer;
 //! the two agree to 1/255. On an adapter that is a CPU itself the host does (c) and (d), as in the paper ([`Evaluator`]).
-//! [`WindowSystem`] opens a window that walks through a bake while it is made, and explains its light.
+//! [`WindowSystem`] opens a window that walks through a bake while it is made, and explains its light. [`web_page`] is a page
+//! that walks through a bake in a browser, by the same shaders.
 
 mod capture;
 mod chunks;
@@ -39,6 +40,7 @@ mod passes;
 mod picture;
 mod read_back;
 mod reading;
+mod recording;
 mod records;
 mod refinement;
 mod screen;
@@ -54,6 +56,7 @@ mod twin;
 mod update;
 mod visibility_pass;
 mod walk;
+mod web;
 mod window;
 
 pub use capture::{Capture, draw_on_gpu};
@@ -64,5 +67,8 @@ pub use mode::{Mode, UnknownMode};
 pub use picture::{Frame, Picture};
 pub use timing::FrameTimes;
 pub use twin::{Twin, draw_on_cpu};
-pub use update::{Explain, LightSource, PictureKind, Refine, Refined, Save, SurfacePoint, Update, Walkthrough};
+pub use update::{
+    Explain, LightSource, PictureKind, Refine, Refined, Save, SavePath, SurfacePoint, Update, Walkthrough,
+};
+pub use web::{BAKE_FILE, HEAD_FILE, PageFile, web_page};
 pub use window::WindowSystem;

@@ -33,7 +33,7 @@ pub enum Mode {
 }
 
 impl Mode {
-    /// All modes. The shader `interpolant_pass.wgsl` numbers them in this order.
+    /// All modes. The shader `evaluation.wgsl` numbers them in this order.
     pub const ALL: [Self; 10] = [
         Self::Shaded,
         Self::Gouraud,

@@ -11,6 +11,7 @@ use crate::{
     digits::{Number, colour, place},
     marks::{self, colour_of},
     pace::{PARTS, Pace},
+    recording::Recording,
     screen::Screen,
     walk::{Clicked, Walk},
 };
@@ -90,7 +91,7 @@ fn work(ui: &mut Ui, walk: &Walk) {
 /// Whether the picture is refined at rest, and how far it is.
 fn refinement(ui: &mut Ui, walk: &Walk, seen: &Seen<'_>, commands: &mut Vec<Command>) {
     ui.horizontal(|ui| {
-        if ui.selectable_label(walk.refines, "refines at rest").on_hover_text("R").clicked() {
+        if ui.selectable_label(walk.refines, "refines at rest").on_hover_text("V").clicked() {
             commands.push(Command::ToggleRefinement);
         }
         if let Some(refined) = seen.refined {
@@ -187,6 +188,11 @@ fn cameras(ui: &mut Ui, walk: &mut Walk, commands: &mut Vec<Command>) {
         }
         if let Some(flight) = walk.flight {
             ui.label(faint(format!("{:.2} m/s", flight.speed)));
+        }
+        let recorded = walk.recording.as_ref().map(Recording::seconds);
+        let text = recorded.map_or_else(|| "record".to_owned(), |seconds| format!("{seconds:.1} s recorded"));
+        if ui.selectable_label(recorded.is_some(), text).on_hover_text("the camera's path, into a file: R").clicked() {
+            commands.push(Command::Record);
         }
     });
     ui.horizontal(|ui| {

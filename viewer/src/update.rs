@@ -3,7 +3,7 @@
 use std::sync::{Arc, mpsc::Receiver};
 
 use glam::DVec3;
-use scene::{Baked, Camera, Rgb};
+use scene::{Baked, Camera, CameraPath, Rgb};
 
 use crate::Frame;
 
@@ -82,6 +82,9 @@ pub struct Refined {
 pub type Refine =
     dyn Fn(&Arc<Baked>, &Frame, &(dyn Fn() -> bool + Sync), &dyn Fn(Refined)) -> Result<(), String> + Send + Sync;
 
+/// Writes the path that a camera went, and says where, or why not. Called on a thread of its own.
+pub type SavePath = dyn Fn(&CameraPath) -> Result<String, String> + Send + Sync;
+
 /// What a window shows, and whom it asks.
 pub struct Walkthrough {
     /// What is shown, for the title.
@@ -94,6 +97,8 @@ pub struct Walkthrough {
     pub save: Arc<Save>,
     /// Refines pictures.
     pub refine: Arc<Refine>,
+    /// Writes paths.
+    pub save_path: Arc<SavePath>,
     /// Is told every notice, where windows and what they show are soon gone.
     pub tell: Box<dyn Fn(&str)>,
 }

@@ -3,14 +3,15 @@
 use std::sync::Arc;
 
 use glam::{DVec2, DVec3};
-use scene::{Baked, Camera, Exposure, MIDDLE_GREY, NamedCamera, ToneCurve};
+use scene::{Baked, Camera, CameraPath, Exposure, MIDDLE_GREY, NamedCamera, ToneCurve};
 
 use crate::{
     Frame, LightSource, Mode, PictureKind, Update,
     command::Command,
-    controls::{Flight, Steering, framing, overview},
+    controls::{ASKEW, Flight, Steering, framing, overview},
     hands::Drag,
     reading::Reading,
+    recording::Recording,
     twin::Twin,
 };
 
@@ -56,6 +57,8 @@ pub(crate) enum Errand {
     /// The camera's flags.
     Copy(String),
     Save(PictureKind),
+    /// The path that was recorded.
+    SavePath(CameraPath),
     Say(String),
     Close,
 }
@@ -76,6 +79,8 @@ pub(crate) struct Walk {
     /// The point that is gone around while a button is held.
     pivot: Option<DVec3>,
     pub cameras: [Option<NamedCamera>; CAMERAS],
+    /// What is being recorded.
+    pub recording: Option<Recording>,
     pub clicked: Option<Clicked>,
     pub lines: bool,
     pub blockers: bool,
@@ -101,6 +106,7 @@ impl Default for Walk {
             orbits: false,
             pivot: None,
             cameras: [const { None }; CAMERAS],
+            recording: None,
             clicked: None,
             lines: true,
             blockers: false,
@@ -135,11 +141,9 @@ impl Walk {
         if self.flight.is_none() {
             let aspect = f64::from(width.max(1)) / f64::from(height.max(1));
             let camera = self.first.or(scene.cameras.first().map(|named| named.camera));
-            let camera = camera.filter(Camera::is_valid).unwrap_or_else(|| {
-                let any =
-                    Camera { eye: DVec3::ZERO, target: DVec3::new(-1.0, 2.0, -0.5), up: DVec3::Z, vertical_fov: 1.0 };
-                overview(&shown.baked, &shown.twin.bvh, &any, aspect)
-            });
+            let camera = camera
+                .filter(Camera::is_valid)
+                .unwrap_or_else(|| overview(&shown.baked, &shown.twin.bvh, &ASKEW, aspect));
             self.flight = Some(Flight::new(camera, scene.size()));
         }
         // Its triangle may be gone, but its place is not.
@@ -186,6 +190,9 @@ impl Walk {
     pub fn step(&mut self, steering: &Steering, seconds: f64, size: (u32, u32)) -> bool {
         let (Some(shown), Some(flight)) = (self.shown.clone(), &mut self.flight) else { return false };
         *flight = flight.step(steering, seconds);
+        if let Some(recording) = &mut self.recording {
+            recording.note(flight.camera, seconds);
+        }
         let is_still = flight.is_still();
         let mut adapts = false;
         if let (true, Some(frame)) = (self.exposure.metered, self.frame(size)) {
@@ -219,6 +226,7 @@ impl Walk {
                 if let (Some(Some(stored)), Some(flight)) = (self.cameras.get(number), &mut self.flight) {
                     *flight = flight.at(stored.camera);
                     self.adapted = false;
+                    self.leap();
                 }
             }
             Command::Store(number) => {
@@ -232,6 +240,7 @@ impl Walk {
             Command::CopyCamera => {
                 return Some(Errand::Copy(camera_flags(&self.flight?.camera)));
             }
+            Command::Record => return self.record(),
             Command::Save(kind) => return Some(Errand::Save(kind)),
             Command::Brighten(stops) => {
                 self.exposure.metered = false;
@@ -261,6 +270,29 @@ impl Walk {
             None => overview(&shown.baked, &shown.twin.bvh, &flight.camera, aspect),
         };
         *flight = flight.at(camera);
+        self.leap();
+    }
+
+    /// Notes, where the walk is recorded, that it is somewhere else at once.
+    fn leap(&mut self) {
+        if let (Some(recording), Some(flight)) = (&mut self.recording, &self.flight) {
+            recording.note(flight.camera, 0.0);
+        }
+    }
+
+    /// Begins to record, or ends it with a path to be written.
+    fn record(&mut self) -> Option<Errand> {
+        let (shown, flight) = (self.shown.as_ref()?, self.flight.as_ref()?);
+        Some(match self.recording.take() {
+            None => {
+                self.recording = Some(Recording::begin(flight.camera));
+                Errand::Say("the camera's path is recorded; R ends it".into())
+            }
+            Some(recording) => match recording.path(shown.baked.scene.size()) {
+                Some(path) => Errand::SavePath(path),
+                None => Errand::Say("the camera did not move: no path is written".into()),
+            },
+        })
     }
 }
 
@@ -383,6 +415,28 @@ mod tests {
         assert_eq!(walk.steered(looking, Drag::Left).around, Some(position));
         walk.obey(Command::Frame, 4.0 / 3.0);
         assert_eq!(walk.flight.unwrap().camera.target, position);
+    }
+
+    #[test]
+    fn a_walk_is_recorded_from_key_to_key() {
+        let mut walk = walk();
+        let says =
+            |errand: Option<Errand>, what: &str| matches!(errand, Some(Errand::Say(said)) if said.contains(what));
+        assert!(says(walk.obey(Command::Record, 1.0), "is recorded"));
+        assert!(says(walk.obey(Command::Record, 1.0), "did not move"));
+        walk.obey(Command::Store(4), 1.0);
+        walk.obey(Command::Record, 1.0);
+        let steering = Steering { motion: DVec3::X, ..Steering::default() };
+        // A frame after a rest takes no time, and moves nothing.
+        for seconds in [0.0, 0.1, 0.1] {
+            walk.step(&steering, seconds, SIZE);
+        }
+        let there = walk.flight.unwrap().camera;
+        walk.obey(Command::Visit(4), 1.0);
+        let Some(Errand::SavePath(path)) = walk.obey(Command::Record, 1.0) else { panic!("no path") };
+        assert!((path.at(0.0).eye - camera().eye).length() < 1e-9);
+        assert!((path.at(0.2).eye - there.eye).length() < 1e-3);
+        assert_eq!((path.times().1, path.at(9.0)), (1.2, camera()), "a leap takes a second");
     }
 
     #[test]

@@ -5,7 +5,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use scene::Baked;
+use scene::{Baked, CameraPath};
 use winit::{
     application::ApplicationHandler,
     dpi::LogicalSize,
@@ -17,7 +17,7 @@ use winit::{
 };
 
 use crate::{
-    PictureKind, Save, SurfacePoint, Update, ViewerError, Walkthrough,
+    PictureKind, Save, SavePath, SurfacePoint, Update, ViewerError, Walkthrough,
     command::Command,
     hands::Hands,
     loader::{Event, GpuSlot, asker, pass_on},
@@ -75,7 +75,8 @@ impl WindowSystem {
         self.run(session)
     }
 
-    fn session(&self, Walkthrough { name, updates, explain, save, refine, tell }: Walkthrough) -> Session {
+    fn session(&self, walkthrough: Walkthrough) -> Session {
+        let Walkthrough { name, updates, explain, save, refine, save_path, tell } = walkthrough;
         let events = self.event_loop.create_proxy();
         let gpu = Arc::new(GpuSlot::default());
         pass_on(updates, gpu.clone(), events.clone());
@@ -98,6 +99,7 @@ impl WindowSystem {
             refinements: Refinements::new(refine, Arc::new(pass)),
             events,
             save,
+            save_path,
             tell,
             failure: None,
         }
@@ -144,6 +146,7 @@ struct Session {
     refinements: Refinements,
     events: EventLoopProxy<Event>,
     save: Arc<Save>,
+    save_path: Arc<SavePath>,
     tell: Box<dyn Fn(&str)>,
     failure: Option<ViewerError>,
 }
@@ -236,6 +239,7 @@ impl Session {
             }
             Some(Errand::Say(what)) => self.say(what),
             Some(Errand::Save(kind)) => self.save_picture(kind, size),
+            Some(Errand::SavePath(path)) => self.save_path(path),
         }
         self.redraw();
     }
@@ -243,11 +247,22 @@ impl Session {
     /// Has a picture of the view written, on a thread of its own.
     fn save_picture(&mut self, kind: PictureKind, size: (u32, u32)) {
         let (Some(shown), Some(frame)) = (self.walk.shown.clone(), self.walk.frame(size)) else { return };
-        let (save, events) = (self.save.clone(), self.events.clone());
+        let save = self.save.clone();
+        self.aside(move || save(&shown.baked, &frame, kind).unwrap_or_else(|why| format!("no picture: {why}")));
+    }
+
+    /// Has a path written, on a thread of its own.
+    fn save_path(&mut self, path: CameraPath) {
+        let save = self.save_path.clone();
+        self.aside(move || save(&path).unwrap_or_else(|why| format!("no path: {why}")));
+    }
+
+    /// Does something on a thread of its own, and tells what comes of it.
+    fn aside(&self, work: impl FnOnce() -> String + Send + 'static) {
+        let events = self.events.clone();
         std::thread::spawn(move || {
-            let said = save(&shown.baked, &frame, kind).unwrap_or_else(|why| format!("no picture: {why}"));
             // A closed window has no use for it.
-            let _ = events.send_event(Event::Update(Update::Notice(said)));
+            let _ = events.send_event(Event::Update(Update::Notice(work())));
         });
     }
 
@@ -446,6 +461,7 @@ mod tests {
             explain: Arc::new(|_, _| Ok(Vec::new())),
             save: Arc::new(|_, _, _| Ok(String::new())),
             refine: Arc::new(|_, _, _, _| Ok(())),
+            save_path: Arc::new(|_| Ok(String::new())),
             tell: Box::new(move |what| heard.lock().unwrap().push(what.to_owned())),
         };
         updates.send(Update::Bake(Arc::new(room()))).unwrap();
