@@ -8,7 +8,7 @@
 use glam::{DVec2, DVec3};
 
 use crate::delaunay::{Mesh, NONE};
-use crate::raster::Piece;
+use crate::raster::{Piece, barycentrics};
 
 /// A quadratic over a triangle by its Bézier ordinates: at the corners, then in the middles of the edges 0→1, 1→2 and 2→0.
 pub(crate) struct Patch {
@@ -22,10 +22,7 @@ impl Piece for Patch {
     }
 
     fn value(&self, point: DVec2) -> DVec3 {
-        let [a, b, c] = self.corners;
-        let area = (b - a).perp_dot(c - a);
-        let (s, t) = ((point - a).perp_dot(c - a) / area, (b - a).perp_dot(point - a) / area);
-        let r = 1.0 - s - t;
+        let [r, s, t] = barycentrics(self.corners, point);
         let [at_a, at_b, at_c, ab, bc, ca] = self.ordinates;
         at_a * (r * r) + at_b * (s * s) + at_c * (t * t) + 2.0 * (ab * (r * s) + bc * (s * t) + ca * (t * r))
     }

@@ -25,6 +25,13 @@ pub(crate) trait Piece: Sync {
     fn value(&self, point: DVec2) -> DVec3;
 }
 
+/// Weights of a triangle's corners at a point.
+pub(crate) fn barycentrics([a, b, c]: [DVec2; 3], point: DVec2) -> [f64; 3] {
+    let area = (b - a).perp_dot(c - a);
+    let (s, t) = ((point - a).perp_dot(c - a) / area, (b - a).perp_dot(point - a) / area);
+    [1.0 - s - t, s, t]
+}
+
 /// Sums over cells: a value times area, and the area.
 #[derive(Clone, Copy, Default)]
 struct Cell {

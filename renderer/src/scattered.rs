@@ -10,7 +10,7 @@ use scene::Display;
 use crate::delaunay::{Delaunay, Mesh};
 use crate::filter::{Filter, SummedFilter};
 use crate::quadratic_patch::patches;
-use crate::raster::{Piece, filtered};
+use crate::raster::{Piece, barycentrics, filtered};
 
 /// A surface through samples.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -64,11 +64,9 @@ impl Piece for Plane {
     }
 
     fn value(&self, point: DVec2) -> DVec3 {
-        let [a, b, c] = self.corners;
-        let area = (b - a).perp_dot(c - a);
-        let (s, t) = ((point - a).perp_dot(c - a) / area, (b - a).perp_dot(point - a) / area);
+        let [r, s, t] = barycentrics(self.corners, point);
         let [at_a, at_b, at_c] = self.values;
-        at_a * (1.0 - s - t) + at_b * s + at_c * t
+        at_a * r + at_b * s + at_c * t
     }
 }
 
