@@ -10,6 +10,7 @@
 use std::collections::VecDeque;
 
 use glam::{DVec3, Vec3};
+use scene::{Ray, luminance};
 
 use crate::environment_lights::EnvironmentLights;
 use crate::evaluation_order::{Step, grid, scanlines};
@@ -17,7 +18,7 @@ use crate::light_set::{contains, count, members, put, words};
 use crate::surface::{Receiver, Surfaces};
 
 /// How visibility is found.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Visibility {
     /// By a ray to every light above the horizon.
     Full,
@@ -26,7 +27,7 @@ pub enum Visibility {
 }
 
 /// A variant of the paper's algorithm.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Coherence {
     /// What a pixel is predicted from.
     pub order: EvaluationOrder,
@@ -36,6 +37,24 @@ pub struct Coherence {
     pub flooding: Flooding,
     /// Whether what is found wrong is doubted further on the finest grid, too, where half of all pixels are.
     pub floods_finest: bool,
+    /// What is done at the borders of objects.
+    pub borders: Borders,
+    /// How many of the lights that are brightest on a pixel are doubted at boundaries, whatever the flooding: section 5 of the paper. Bright lights
+    /// have small cells, and are what is seen of an error.
+    pub brightest: u32,
+    /// The part of the light of an unobstructed pixel, 0..1, that may be guessed: of the lights that known pixels disagree on the faintest are not
+    /// traced, as long as all of them together send no more.
+    pub error: f64,
+}
+
+/// What is done with a pixel of which not all that it is predicted from are of its own object.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Borders {
+    /// A ray to every light, as the paper has it.
+    Traced,
+    /// It is predicted from those that are, if there are two or more, and boundaries of what is seen are doubted, and what is found wrong flooded, whatever is done
+    /// elsewhere.
+    Predicted,
 }
 
 /// What a pixel is predicted from.
@@ -61,7 +80,7 @@ pub enum Flooding {
 impl Visibility {
     /// The variants by the paper's names: S scanline or G grid, W warping or N none, B boundary or U uncertainty, and OPT; each of OPT's
     /// two restrictions alone; and full tracing.
-    pub const NAMED: [(&'static str, Self); 12] = [
+    pub const NAMED: [(&'static str, Self); 14] = [
         ("full", Self::Full),
         ("swb", coherent(EvaluationOrder::Scanline, true, Flooding::Boundary, true)),
         ("swu", coherent(EvaluationOrder::Scanline, true, Flooding::Uncertainty, true)),
@@ -74,12 +93,24 @@ impl Visibility {
         ("gnu-restricted", coherent(EvaluationOrder::Grid, false, Flooding::Restricted, true)),
         ("gnu-unflooded", coherent(EvaluationOrder::Grid, false, Flooding::Uncertainty, false)),
         ("opt", coherent(EvaluationOrder::Grid, false, Flooding::Restricted, false)),
+        ("gnu-borders", predicting_borders(Flooding::Uncertainty, true)),
+        ("opt-borders", predicting_borders(Flooding::Restricted, false)),
     ];
 }
 
 const fn coherent(order: EvaluationOrder, warps: bool, flooding: Flooding, floods_finest: bool) -> Visibility {
-    Visibility::Coherent(Coherence { order, warps, flooding, floods_finest })
+    let borders = Borders::Traced;
+    Visibility::Coherent(Coherence { order, warps, flooding, floods_finest, borders, brightest: 0, error: 0.0 })
 }
+
+const fn predicting_borders(flooding: Flooding, floods_finest: bool) -> Visibility {
+    let (order, borders) = (EvaluationOrder::Grid, Borders::Predicted);
+    Visibility::Coherent(Coherence { order, warps: false, flooding, floods_finest, borders, brightest: 0, error: 0.0 })
+}
+
+/// Pixels of its own object that one at a border is predicted from at least: from a single one a quarter fewer rays are traced there, and
+/// single pixels are off by half of their light.
+const FEWEST_AT_BORDERS: usize = 2;
 
 /// A pixel that light is asked for at.
 #[derive(Clone, Copy, Debug)]
@@ -95,6 +126,8 @@ pub(crate) struct BlockVisibility {
     pub seen: Vec<u64>,
     /// By pixel, how many rays were traced.
     pub traced: Vec<u32>,
+    /// By pixel, how many lights are above its horizon.
+    pub above: Vec<u32>,
 }
 
 /// Finds the lights that are seen at every pixel of a block of so many columns and rows; none are at a pixel without a place.
@@ -106,31 +139,59 @@ pub(crate) fn block_visibility(
     visibility: Visibility,
 ) -> BlockVisibility {
     let mut search = Search::new(surfaces, lights, places, visibility);
-    let Visibility::Coherent(Coherence { order, flooding, .. }) = visibility else {
+    let Visibility::Coherent(coherence) = visibility else {
         (0..places.len()).for_each(|pixel| search.trace_all(pixel));
         return search.known;
     };
-    let steps = match order {
-        EvaluationOrder::Scanline => scanlines(width, height, flooding != Flooding::Boundary),
+    let steps = match coherence.order {
+        EvaluationOrder::Scanline => scanlines(width, height, coherence.flooding != Flooding::Boundary),
         EvaluationOrder::Grid => grid(width, height),
     };
-    for step in &steps {
+    let at_borders = Coherence { flooding: Flooding::Boundary, floods_finest: true, ..coherence };
+    for mut step in steps {
         let object = |pixel: usize| places[pixel].map(|place| place.object);
-        let is_alike = step.sources.iter().all(|&source| object(source) == object(step.pixel));
-        if step.sources.is_empty() || !is_alike {
+        let sources = step.sources.len();
+        step.sources.retain(|&source| object(source) == object(step.pixel));
+        let is_border = step.sources.len() < sources;
+        let fewest = match coherence.borders {
+            _ if !is_border => 1,
+            Borders::Traced => usize::MAX,
+            Borders::Predicted => FEWEST_AT_BORDERS,
+        };
+        if step.sources.len() < fewest {
             search.trace_all(step.pixel);
         } else {
-            search.predict(step);
+            search.predict(&step, if is_border { at_borders } else { coherence });
         }
     }
     search.known
 }
 
-/// The lights above the horizon of a receiver.
-pub(crate) fn lights_above(lights: &EnvironmentLights, receiver: &Receiver, above: &mut [u64]) {
-    for (word, directions) in above.iter_mut().zip(lights.directions.chunks(u64::BITS as usize)) {
-        let bit = |(bit, &direction): (u32, &DVec3)| u64::from(receiver.cosine_to(direction) > 0.0) << bit;
-        *word = (0..).zip(directions).map(bit).fold(0, |word, bit| word | bit);
+/// Directions of lights, coordinate by coordinate, so that several are compared with a horizon at once.
+struct Directions([Vec<f64>; 3]);
+
+impl Directions {
+    fn new(directions: &[DVec3]) -> Self {
+        Self([0, 1, 2].map(|axis| directions.iter().map(|direction| direction[axis]).collect()))
+    }
+
+    /// The lights above the horizon of a receiver: those that count on it.
+    fn above(&self, receiver: &Receiver, above: &mut [u64]) {
+        let Self([x, y, z]) = self;
+        let (n, c) = (receiver.normal, receiver.cosine);
+        let is_flat = n == c;
+        for (i, word) in above.iter_mut().enumerate() {
+            let first = i * u64::BITS as usize;
+            let range = first..(first + u64::BITS as usize).min(x.len());
+            let mut is_above = [false; u64::BITS as usize];
+            let along = |a: DVec3, i: usize| a.x * x[i] + a.y * y[i] + a.z * z[i];
+            if is_flat {
+                range.zip(&mut is_above).for_each(|(i, is_above)| *is_above = along(n, i) > 0.0);
+            } else {
+                range.zip(&mut is_above).for_each(|(i, is_above)| *is_above = along(n, i).min(along(c, i)) > 0.0);
+            }
+            *word = is_above.iter().rev().fold(0, |word, &is_above| word << 1 | u64::from(is_above));
+        }
     }
 }
 
@@ -138,8 +199,10 @@ pub(crate) fn lights_above(lights: &EnvironmentLights, receiver: &Receiver, abov
 struct Search<'a> {
     surfaces: &'a Surfaces<'a>,
     lights: &'a EnvironmentLights,
+    directions: Directions,
+    /// Of the irradiance of lights on what faces them.
+    luminances: Vec<f64>,
     places: &'a [Option<Place>],
-    coherence: Option<Coherence>,
     known: BlockVisibility,
     /// By pixel and light, a point of what hides it, relative to the pixel, metres; not a number where nothing does. Empty without warping.
     blockers: Vec<Vec3>,
@@ -161,18 +224,15 @@ impl<'a> Search<'a> {
         visibility: Visibility,
     ) -> Self {
         let (words, pixels) = (words(lights.directions.len()), places.len());
-        let coherence = match visibility {
-            Visibility::Full => None,
-            Visibility::Coherent(coherence) => Some(coherence),
-        };
-        let warps = coherence.is_some_and(|coherence| coherence.warps);
+        let warps = matches!(visibility, Visibility::Coherent(Coherence { warps: true, .. }));
         let set = || vec![0; words];
         Self {
             surfaces,
             lights,
+            directions: Directions::new(&lights.directions),
+            luminances: lights.irradiance.iter().map(|&light| luminance(light)).collect(),
             places,
-            coherence,
-            known: BlockVisibility { seen: vec![0; pixels * words], traced: vec![0; pixels] },
+            known: BlockVisibility { seen: vec![0; pixels * words], traced: vec![0; pixels], above: vec![0; pixels] },
             blockers: vec![Vec3::NAN; if warps { pixels * lights.directions.len() } else { 0 }],
             words,
             above: set(),
@@ -186,12 +246,18 @@ impl<'a> Search<'a> {
     /// Traces a ray to every light above a pixel's horizon.
     fn trace_all(&mut self, pixel: usize) {
         let Some(place) = self.places[pixel] else { return };
-        lights_above(self.lights, &place.receiver, &mut self.above);
+        self.look_up(pixel, &place.receiver);
         for word in 0..self.words {
             for light in members(&[self.above[word]]) {
                 self.trace(pixel, &place.receiver, (word * u64::BITS as usize) as u32 + light);
             }
         }
+    }
+
+    /// Finds the lights above a pixel's horizon.
+    fn look_up(&mut self, pixel: usize, receiver: &Receiver) {
+        self.directions.above(receiver, &mut self.above);
+        self.known.above[pixel] = count(&self.above) as u32;
     }
 
     /// Traces a ray from a pixel to a light; whether the light is seen.
@@ -204,7 +270,7 @@ impl<'a> Search<'a> {
         let is_seen = if self.blockers.is_empty() {
             !self.surfaces.bvh.is_blocked_among(receiver.position, receiver.position + way, stands)
         } else {
-            let ray = scene::Ray { origin: receiver.position, direction };
+            let ray = Ray { origin: receiver.position, direction };
             let hit = self.surfaces.bvh.closest_hit_among(&ray, stands);
             let blocker = hit.map_or(Vec3::NAN, |hit| (direction * hit.distance).as_vec3());
             self.blockers[pixel * self.lights.directions.len() + light as usize] = blocker;
@@ -215,15 +281,16 @@ impl<'a> Search<'a> {
     }
 
     /// Predicts a pixel, and traces what is doubtful.
-    fn predict(&mut self, step: &Step) {
-        let (Some(place), Some(coherence)) = (self.places[step.pixel], self.coherence) else { return };
-        lights_above(self.lights, &place.receiver, &mut self.above);
+    fn predict(&mut self, step: &Step, coherence: Coherence) {
+        let Some(place) = self.places[step.pixel] else { return };
+        self.look_up(step.pixel, &place.receiver);
+        let is_boundary = coherence.flooding == Flooding::Boundary;
         if coherence.warps {
-            self.predict_by_blockers(step, &place.receiver);
+            self.predict_by_blockers(step, &place.receiver, is_boundary);
         } else {
-            self.predict_by_agreement(step, &place.receiver);
+            self.predict_by_agreement(step, &place.receiver, is_boundary && coherence.borders == Borders::Traced);
         }
-        self.doubt(step.pixel, coherence);
+        self.doubt(step, &place.receiver, coherence);
         let floods = coherence.floods_finest || !step.is_finest;
         while let Some(light) = self.queue.pop_front() {
             let predicted = contains(self.seen(step.pixel), light);
@@ -248,8 +315,8 @@ impl<'a> Search<'a> {
     }
 
     /// What the known pixels agree on.
-    fn predict_by_agreement(&mut self, step: &Step, receiver: &Receiver) {
-        let is_boundary = self.coherence.is_some_and(|coherence| coherence.flooding == Flooding::Boundary);
+    /// With `hides_all`, what any of them has hidden is predicted hidden, instead of nothing where they disagree.
+    fn predict_by_agreement(&mut self, step: &Step, receiver: &Receiver, hides_all: bool) {
         self.uncertain.copy_from_slice(&self.above);
         let (mut seen_by_any, mut hidden_for_any) = (vec![0; self.words], vec![0; self.words]);
         for &source in &step.sources {
@@ -257,7 +324,7 @@ impl<'a> Search<'a> {
             if other.normal == receiver.normal && other.cosine == receiver.cosine {
                 self.source_above.copy_from_slice(&self.above);
             } else {
-                lights_above(self.lights, &other, &mut self.source_above);
+                self.directions.above(&other, &mut self.source_above);
             }
             for word in 0..self.words {
                 let seen = self.known.seen[source * self.words + word];
@@ -268,13 +335,14 @@ impl<'a> Search<'a> {
         for word in 0..self.words {
             let (seen, hidden) = (seen_by_any[word], hidden_for_any[word]);
             let (is_known, is_agreed) = (seen | hidden, seen ^ hidden);
-            self.uncertain[word] &= if is_boundary { !is_known } else { !is_agreed };
+            self.uncertain[word] &= if hides_all { !is_known } else { !is_agreed };
             self.known.seen[step.pixel * self.words + word] = self.above[word] & seen & !hidden;
         }
     }
 
     /// What the blockers of the known pixels hide: a light in whose cell as many lie as there are known pixels.
-    fn predict_by_blockers(&mut self, step: &Step, receiver: &Receiver) {
+    /// With `hides_all`, one blocker is enough.
+    fn predict_by_blockers(&mut self, step: &Step, receiver: &Receiver, hides_all: bool) {
         let lights = self.lights.directions.len();
         let mut counts = vec![0; lights];
         let mut nearest = vec![(f64::NEG_INFINITY, Vec3::NAN); lights];
@@ -293,8 +361,7 @@ impl<'a> Search<'a> {
                 }
             }
         }
-        let is_boundary = self.coherence.is_some_and(|coherence| coherence.flooding == Flooding::Boundary);
-        let enough = if is_boundary { 1 } else { step.sources.len() };
+        let enough = if hides_all { 1 } else { step.sources.len() };
         self.uncertain.fill(0);
         for light in members(&self.above) {
             let blockers = counts[light as usize];
@@ -304,29 +371,63 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Doubts what is uncertain, and with boundary flooding where seen and hidden meet.
-    fn doubt(&mut self, pixel: usize, coherence: Coherence) {
+    /// Doubts what is uncertain, and boundaries where seen and hidden meet: all with boundary flooding, else those of the brightest lights.
+    fn doubt(&mut self, step: &Step, receiver: &Receiver, coherence: Coherence) {
         self.doubted.fill(0);
-        for light in members(&self.uncertain) {
+        let ranks = coherence.error > 0.0 || coherence.brightest > 0;
+        let lights = if ranks { self.lights.directions.iter() } else { [].iter() };
+        let strengths = lights.zip(&self.luminances).map(|(&to, luminance)| luminance * receiver.cosine_to(to));
+        let strengths: Vec<f64> = strengths.collect();
+        let strength = |light: &u32| strengths[*light as usize];
+        let mut uncertain: Vec<u32> = members(&self.uncertain).collect();
+        if coherence.error > 0.0 {
+            uncertain.sort_by(|a, b| strength(a).total_cmp(&strength(b)));
+            let mut left = coherence.error * members(&self.above).map(|light| strength(&light)).sum::<f64>();
+            let traced = uncertain.iter().position(|light| {
+                left -= strength(light);
+                left < 0.0
+            });
+            let traced = uncertain.split_off(traced.unwrap_or(uncertain.len()));
+            for light in std::mem::replace(&mut uncertain, traced) {
+                self.guess(step, light);
+            }
+        }
+        for light in uncertain {
             enqueue(&mut self.queue, &mut self.doubted, &self.above, light);
         }
-        if coherence.flooding != Flooding::Boundary {
-            return;
+        let mut at_risk: Vec<u32> = Vec::new();
+        if coherence.flooding == Flooding::Boundary {
+            at_risk = members(&self.above).collect();
+        } else if coherence.brightest > 0 {
+            at_risk = members(&self.above).collect();
+            at_risk.sort_by(|a, b| strength(b).total_cmp(&strength(a)));
+            at_risk.truncate(coherence.brightest as usize);
         }
         let has_horizon = coherence.order == EvaluationOrder::Scanline;
-        for light in members(&self.above) {
-            let seen = &self.known.seen[pixel * self.words..];
-            let is_border = self.lights.voronoi.neighbours(light).iter().any(|&neighbour| {
+        for light in at_risk {
+            let seen = &self.known.seen[step.pixel * self.words..];
+            let is_boundary = self.lights.voronoi.neighbours(light).iter().any(|&neighbour| {
                 if contains(&self.above, neighbour) {
                     contains(seen, neighbour) != contains(seen, light)
                 } else {
                     has_horizon
                 }
             });
-            if is_border {
+            if is_boundary {
                 enqueue(&mut self.queue, &mut self.doubted, &self.above, light);
             }
         }
+    }
+
+    /// Takes a light for seen if more known pixels see it than not; where as many do, at every other pixel.
+    fn guess(&mut self, step: &Step, light: u32) {
+        let seen = step.sources.iter().filter(|&&source| contains(self.seen(source), light)).count();
+        let direction = self.lights.directions[light as usize];
+        let is_above = |source: &&usize| self.places[**source].is_some_and(|at| at.receiver.cosine_to(direction) > 0.0);
+        let known = step.sources.iter().filter(is_above).count();
+        let is_seen = 2 * seen > known || 2 * seen == known && (step.pixel + light as usize).is_multiple_of(2);
+        put(&mut self.known.seen[step.pixel * self.words..][..self.words], light, is_seen);
+        put(&mut self.uncertain, light, false);
     }
 }
 
@@ -336,11 +437,4 @@ fn enqueue(queue: &mut VecDeque<u32>, doubted: &mut [u64], above: &[u64], light:
         put(doubted, light, true);
         queue.push_back(light);
     }
-}
-
-/// Lights above the horizon of a receiver, counted.
-pub(crate) fn count_above(lights: &EnvironmentLights, receiver: &Receiver) -> u64 {
-    let mut above = vec![0; words(lights.directions.len())];
-    lights_above(lights, receiver, &mut above);
-    count(&above)
 }

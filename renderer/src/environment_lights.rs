@@ -161,7 +161,6 @@ mod tests {
             for sampling in BOTH {
                 let lights = EnvironmentLights::new(environment, 200, sampling).unwrap();
                 let error = largest_error(environment, &lights);
-                eprintln!("{i} {sampling:?}: {:.4} %", 100.0 * error);
                 assert_eq!(lights.count(), 200);
                 assert!(error < 5e-3, "{i}, {sampling:?}: {error}");
             }

@@ -40,7 +40,7 @@ mod whitted;
 
 pub use adaptive::{AdaptiveOptions, AdaptiveSampler};
 pub use cell::MOST_PIXELS;
-pub use coherent_visibility::{Coherence, EvaluationOrder, Flooding, Visibility};
+pub use coherent_visibility::{Borders, Coherence, EvaluationOrder, Flooding, Visibility};
 pub use confidence::Interval;
 pub use environment_lights::{EnvironmentLights, SkySampling};
 pub use evaluation::{Evaluation, Evaluator};

@@ -11,7 +11,7 @@ use glam::{DVec2, Vec3};
 use rayon::prelude::*;
 use scene::{Environment, Rgb};
 
-use crate::coherent_visibility::{BlockVisibility, Place, Visibility, block_visibility, count_above};
+use crate::coherent_visibility::{BlockVisibility, Place, Visibility, block_visibility};
 use crate::environment_lights::EnvironmentLights;
 use crate::eye::{Eye, SeenPoint, Sight};
 use crate::light_set::{members, words};
@@ -133,7 +133,7 @@ fn block(
 
     let start = Instant::now();
     let mut made = SkyPicture { rays: found.traced.iter().map(|&rays| u64::from(rays)).sum(), ..SkyPicture::default() };
-    let BlockVisibility { seen, traced } = found;
+    let BlockVisibility { seen, traced, above } = found;
     let words = words(lights.directions.len());
     for i in (0..size[1] as usize).flat_map(|row| row * columns..row * columns + size[0] as usize) {
         let seen = &seen[i * words..][..words];
@@ -142,7 +142,6 @@ fn block(
             (Sight::Back(_), _) => Rgb::ZERO,
             (Sight::Front(front), None) => eye.scene().material(front.point.polygon).radiance,
             (Sight::Front(front), Some(place)) => {
-                made.pairs += count_above(lights, &place.receiver);
                 let light = |light: u32| {
                     let light = light as usize;
                     lights.irradiance[light] * place.receiver.cosine.dot(lights.directions[light])
@@ -153,6 +152,7 @@ fn block(
         };
         made.radiance.push(radiance.as_vec3());
         made.traced.push(traced[i]);
+        made.pairs += u64::from(above[i]);
         if keeps_seen {
             made.seen.extend_from_slice(seen);
         }
