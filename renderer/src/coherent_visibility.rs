@@ -108,8 +108,8 @@ const fn predicting_borders(flooding: Flooding, floods_finest: bool) -> Visibili
     Visibility::Coherent(Coherence { order, warps: false, flooding, floods_finest, borders, brightest: 0, error: 0.0 })
 }
 
-/// Pixels of its own object that one at a border is predicted from at least: from a single one a quarter fewer rays are traced there, and
-/// single pixels are off by half of their light.
+/// Pixels of its own object that one at a border is predicted from at least: from a single one hardly fewer rays are traced in all, and on a
+/// plant a quarter more is predicted wrong.
 const FEWEST_AT_BORDERS: usize = 2;
 
 /// A pixel that light is asked for at.

@@ -10,8 +10,9 @@ use scene::Rgb;
 
 use crate::sky_pieces::Piece;
 
-/// Normals that are fitted to: a few times as many as the lights of a picture, so that between them nothing is left free.
+/// Normals that are fitted to at least, and for each light: with fewer than a few a light what is between them is left free.
 const NORMALS: u32 = 1024;
+const NORMALS_A_LIGHT: u32 = 3;
 
 /// What a relative change of a light counts beside an error of irradiance, in squares of the mean light's own irradiance. Less fits better,
 /// and lets single lights stray from the light of their cells, which shows where only some of them are seen.
@@ -28,7 +29,7 @@ const LEAST: f64 = 0.1;
 
 /// The strengths of lights, W·m⁻² on a surface that faces them, changed so that all of them send what the pieces send.
 pub(crate) fn fitted(pieces: &[Piece], directions: &[DVec3], strengths: &[Rgb]) -> Vec<Rgb> {
-    let normals: Vec<DVec3> = spread_normals(NORMALS).collect();
+    let normals: Vec<DVec3> = spread_normals(NORMALS.max(NORMALS_A_LIGHT * directions.len() as u32)).collect();
     let wanted: Vec<Rgb> = normals.par_iter().map(|&normal| irradiance(pieces, normal)).collect();
     let mut fitted = strengths.to_vec();
     for channel in 0..3 {
