@@ -1,6 +1,7 @@
 //! Writes a generated scene: `cargo run --release --example generate -- hall 24000 OUT.obj`, or `-- rooms 8 OUT.obj`.
 //!
-//! The number is that of polygons of the hall, or that of rooms. An MTL file of the same name is written beside it.
+//! The number is that of polygons of the hall, of rooms, of faces around a round shape, of dominoes or of leaves. An MTL file of the same name is
+//! written beside it.
 
 #[path = "../benches/common/generated/mod.rs"]
 mod generated;
@@ -15,7 +16,7 @@ const LARGEST: u32 = 20_000_000;
 fn main() -> Result<()> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let [family, size, output] = arguments.as_slice() else {
-        bail!("give a family (hall or rooms), a size and an .obj file to write");
+        bail!("give a family (hall, rooms, shapes, dominoes or plant), a size and an .obj file to write");
     };
     let size: u32 = size.parse().with_context(|| format!("{size:?} is not a size; write a whole number"))?;
     if size > LARGEST {
@@ -24,7 +25,10 @@ fn main() -> Result<()> {
     let scene = match family.as_str() {
         "hall" => generated::hall(size),
         "rooms" => generated::rooms(size),
-        _ => bail!("{family:?} is no family of scenes; give hall or rooms"),
+        "shapes" => generated::shapes(size),
+        "dominoes" => generated::dominoes(size),
+        "plant" => generated::plant(size),
+        _ => bail!("{family:?} is no family of scenes; give hall, rooms, shapes, dominoes or plant"),
     };
     scene.validate().with_context(|| format!("a scene of that size is none; give less than {size}"))?;
     let obj = Path::new(output);

@@ -14,8 +14,10 @@ use viewer::Mode;
 use crate::failure::Usage;
 
 mod render;
+mod sky;
 
 pub use render::{Budget, Interpolation, RadianceChoice, RadianceFlags, RenderFlags, SamplerChoice};
+pub use sky::{SkyFlags, SkySource};
 
 /// Largest side of a picture, pixels: what every GPU of the last ten years takes as a texture.
 const LARGEST_SIDE: u32 = 16_384;
@@ -46,7 +48,7 @@ pub enum Command {
     /// Draw a picture
     Shot(ShotFlags),
     /// Make a picture from samples of the image plane, each along a ray
-    Render(RenderFlags),
+    Render(Box<RenderFlags>),
     /// Walk through the light in a window
     View(ViewFlags),
     /// Write a page to walk through the light in a browser

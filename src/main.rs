@@ -29,6 +29,7 @@ mod render;
 mod report;
 mod resume;
 mod shot;
+mod sky;
 mod validate;
 mod verification;
 mod verify;

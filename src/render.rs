@@ -19,6 +19,7 @@ use crate::picture::{Picture, Reconstruction, Seconds, encoded};
 use crate::progress::{Stage, say};
 use crate::radiance;
 use crate::report::print_json;
+use crate::sky;
 
 /// Samples a pixel of the full sampler, where no budget is given.
 const FULL: f64 = 4.0;
@@ -31,6 +32,9 @@ const FIRST_SNAPSHOT: u64 = 1024;
 
 /// Makes a picture.
 pub fn run(flags: &RenderFlags, outputs: &Outputs, interrupt: &Interrupt) -> Result<Outcome> {
+    if let Some(source) = &flags.sky.environment {
+        return sky::run(flags, source, outputs);
+    }
     flags.camera.viewpoint()?;
     radiance::check(&flags.radiance)?;
     let limit = Limit::of(flags)?;

@@ -4,7 +4,7 @@ use glam::DVec3;
 use scene::{Bvh, HalfEdges, NO_TWIN, Ray, Scene};
 
 use crate::fixture::folder;
-use crate::generated::{hall, mtl, obj, rooms};
+use crate::generated::{dominoes, hall, mtl, obj, plant, rooms, shapes};
 
 /// The scene as the importer reads it from its text.
 fn read_back(scene: &Scene) -> formats::Imported {
@@ -47,6 +47,22 @@ fn what_is_written_reads_back_to_the_same_scene_with_nothing_to_repair() {
         assert_eq!(imported.scene.polygons.len(), scene.polygons.len());
         assert_eq!(imported.scene.power(), scene.power());
         assert!((imported.scene.surface_area() / scene.surface_area() - 1.0).abs() < 1e-12);
+    }
+}
+
+/// Round bodies keep their normals, and every body stands on the floor that the camera looks at.
+#[test]
+fn what_stands_under_the_sky_reads_back() {
+    for scene in [shapes(32), dominoes(36), plant(20)] {
+        assert_eq!(scene.validate(), Ok(()));
+        let imported = read_back(&scene);
+        assert_eq!(imported.report.warnings, Vec::<String>::new());
+        // By area: two triangles in one plane come back as one face. Normals within a degree of the face's own are not kept.
+        let smooth = |scene: &Scene| -> f64 {
+            scene.polygon_ids().filter(|&id| scene.has_shading_normals(id)).map(|id| scene.area(id)).sum()
+        };
+        assert!(smooth(&imported.scene) >= 0.8 * smooth(&scene), "{} of {}", smooth(&imported.scene), smooth(&scene));
+        assert_eq!(scene.bounds().0.z, 0.0);
     }
 }
 

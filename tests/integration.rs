@@ -12,6 +12,7 @@ mod closed_forms;
 mod continuity;
 mod desktop;
 mod determinism;
+mod environment;
 mod fixture;
 mod frames;
 #[path = "../benches/common/generated/mod.rs"]

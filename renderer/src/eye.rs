@@ -52,6 +52,11 @@ impl<'a> Eye<'a> {
         self.surfaces.scene
     }
 
+    /// Columns and rows of the picture.
+    pub fn size(&self) -> [u32; 2] {
+        self.size
+    }
+
     /// The ray through a point of the image plane.
     pub fn ray(&self, point: DVec2) -> Ray {
         self.camera.ray(point, self.size[0], self.size[1])

@@ -8,6 +8,8 @@ mod baked;
 mod bvh;
 mod camera;
 mod camera_path;
+mod cie_sky;
+mod environment;
 mod exposure;
 mod half_edge;
 mod interpolant;
@@ -27,6 +29,8 @@ pub use baked::{Baked, BakedElement, BakedError, BakedTriangle, DiscontinuityLin
 pub use bvh::{Bvh, Hit};
 pub use camera::{Camera, NamedCamera};
 pub use camera_path::{CameraKey, CameraPath, CameraPathError};
+pub use cie_sky::{CIE_SKIES, CieSky};
+pub use environment::{Environment, LatLongMap, Sky, UpAxis, texel_solid_angle};
 pub use exposure::{Display, Exposure, MIDDLE_GREY, ToneCurve, decode_srgb, encode_srgb};
 pub use half_edge::{HalfEdges, NO_TWIN};
 pub use interpolant::{Interpolant, SAMPLE_BARYCENTRICS};

@@ -6,7 +6,7 @@ use clap::{Args, ValueEnum};
 use renderer::{Filter, Interval, Rule};
 use scene::ToneCurve;
 
-use super::{CameraFlags, ExposureChoice, MOST_SAMPLES, SceneFlags};
+use super::{CameraFlags, ExposureChoice, MOST_SAMPLES, SceneFlags, SkyFlags};
 use super::{exposure, fraction, image_path, number, png_path, positive, size, tone_curve};
 
 /// `halflight render`.
@@ -39,6 +39,9 @@ pub struct RenderFlags {
     /// What a sample sees
     #[command(flatten)]
     pub radiance: RadianceFlags,
+    /// The sky, where it is what lights the scene
+    #[command(flatten)]
+    pub sky: SkyFlags,
     /// How much is done: samples a pixel (1.9rpp, or a bare number), seconds (30s), or samples as a share of the pixels (6%)
     /// [default: until every pixel is known; with --sampler full 4 samples a pixel]
     #[arg(long, value_name = "N|Nrpp|Ns|N%", value_parser = budget, allow_hyphen_values = true)]

@@ -120,6 +120,57 @@ impl Modeller {
         });
     }
 
+    /// Two faces of opposite fronts.
+    pub fn sheet(&mut self, material: u32, outline: &[DVec3]) {
+        self.face(material, outline);
+        self.face(material, &outline.iter().rev().copied().collect::<Vec<_>>());
+    }
+
+    /// The surface over a grid of so many cells, two triangles each, counter-clockwise where u goes right and v up; u and v from 0 to 1.
+    pub fn surface(&mut self, material: u32, [columns, rows]: [u32; 2], at: impl Fn(f64, f64) -> DVec3) {
+        let at = |i: u32, j: u32| at(f64::from(i) / f64::from(columns), f64::from(j) / f64::from(rows));
+        for (i, j) in (0..rows).flat_map(|j| (0..columns).map(move |i| (i, j))) {
+            let [a, b, c, d] = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
+            // At a pole one side has no length.
+            let rounding = 1.0 / GRID;
+            for [a, b, c] in [[a, b, c], [a, c, d]] {
+                if (b - a).cross(c - a).length() > rounding * rounding {
+                    self.face(material, &[a, b, c]);
+                }
+            }
+        }
+    }
+
+    /// The scene, with normals at the corners of the objects of which `is_smooth` says so.
+    pub fn smoothed(self, is_smooth: impl Fn(&str) -> bool) -> Scene {
+        let mut scene = self.scene;
+        let smooth: Vec<bool> = scene.objects.iter().map(|name| is_smooth(name)).collect();
+        // A two-sided sheet has a normal on either side.
+        let mut sums: HashMap<(u32, u32, bool), DVec3> = HashMap::new();
+        let side = |normal: DVec3| normal.dot(DVec3::new(0.31, 0.17, 0.93)) > 0.0;
+        let is_sheet: Vec<bool> = scene::other_sides(&scene).iter().map(Option::is_some).collect();
+        let key = |scene: &Scene, polygon: u32, vertex: u32| {
+            let front = is_sheet[polygon as usize] && side(scene.plane(polygon).normal);
+            (scene.polygons[polygon as usize].object, vertex, front)
+        };
+        for polygon in scene.polygon_ids() {
+            let normal = scene.plane(polygon).normal * scene.area(polygon);
+            for &vertex in &scene.corners[scene.polygons[polygon as usize].corner_range()] {
+                *sums.entry(key(&scene, polygon, vertex)).or_default() += normal;
+            }
+        }
+        let mut normals = Vec::with_capacity(scene.corners.len());
+        for polygon in scene.polygon_ids() {
+            for &vertex in &scene.corners[scene.polygons[polygon as usize].corner_range()] {
+                let is_smooth = smooth[scene.polygons[polygon as usize].object as usize];
+                let normal = sums[&key(&scene, polygon, vertex)].normalize_or_zero().as_vec3();
+                normals.push(if is_smooth { normal } else { glam::Vec3::ZERO });
+            }
+        }
+        scene.shading_normals = normals;
+        scene
+    }
+
     pub fn scene(self) -> Scene {
         self.scene
     }

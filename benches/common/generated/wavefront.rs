@@ -18,17 +18,25 @@ pub fn obj(scene: &Scene, library: &str) -> String {
     for v in &scene.vertices {
         let _ = writeln!(text, "v {} {} {}", v.x, v.y, v.z);
     }
-    let (mut object, mut material) = (None, None);
-    for polygon in &scene.polygons {
+    let (mut object, mut material, mut normals) = (None, None, 0);
+    for (id, polygon) in (0..).zip(&scene.polygons) {
         if object.replace(polygon.object) != Some(polygon.object) {
             let _ = writeln!(text, "o {}", scene.objects[polygon.object as usize]);
         }
         if material.replace(polygon.material) != Some(polygon.material) {
             let _ = writeln!(text, "usemtl {}", scene.materials[polygon.material as usize].name);
         }
+        let is_smooth = scene.has_shading_normals(id);
+        for n in scene.shading_normals.get(polygon.corner_range()).into_iter().flatten().filter(|_| is_smooth) {
+            let _ = writeln!(text, "vn {} {} {}", n.x, n.y, n.z);
+        }
         text.push('f');
         for corner in &scene.corners[polygon.corner_range()] {
-            let _ = write!(text, " {}", corner + 1);
+            normals += u32::from(is_smooth);
+            let _ = match is_smooth {
+                true => write!(text, " {}//{normals}", corner + 1),
+                false => write!(text, " {}", corner + 1),
+            };
         }
         text.push('\n');
     }
