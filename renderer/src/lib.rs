@@ -5,7 +5,9 @@
 //! from a point of the image plane to what is seen there ([`Evaluator`]), and a [`Film`] makes a picture of their samples.
 
 mod adaptive;
+mod block;
 mod cell;
+mod coherence_map;
 mod confidence;
 mod delaunay;
 mod emitters;
@@ -15,21 +17,26 @@ mod film;
 mod filter;
 mod kd_tree;
 mod lobe;
+mod oriented_element;
 mod path_trace;
 mod quadratic_patch;
 mod raster;
+mod reduction;
 mod reference;
 mod sample_map;
 mod scattered;
 mod sequence;
+mod simplicity;
 mod spherical_triangle;
 mod surface;
 mod survey;
 mod uniform;
 mod whitted;
+mod work_image;
 
 pub use adaptive::{AdaptiveOptions, AdaptiveSampler};
 pub use cell::MOST_PIXELS;
+pub use coherence_map::{CoherenceMap, CoherenceOptions};
 pub use confidence::Interval;
 pub use evaluation::{Evaluation, Evaluator};
 pub use eye::{Eye, SeenPoint, Sight};
