@@ -18,15 +18,15 @@ use std::ops::Range;
 
 use glam::{DVec2, Vec2, Vec3};
 use rayon::prelude::*;
-use scene::{Display, luminance};
+use scene::{Display, Exposure, ToneCurve, luminance};
 
 use crate::block::{Block, ELEMENTARY};
 use crate::cell::MOST_PIXELS;
 use crate::evaluation::Evaluation;
-use crate::filter::Filter;
+use crate::line_grid::LineGrid;
 use crate::oriented_element::{Boundary, unit_vector};
-use crate::reduction::Reduction;
 use crate::simplicity::{Simplicity, simplicity};
+use crate::visible_lines::VisibleLine;
 use crate::work_image::{WorkImage, WorkPixel};
 
 /// Contrast of a block's corners from which on it is an edge block (Guo's t_c).
@@ -40,6 +40,19 @@ const FINE_CONTRAST: f32 = 0.02;
 /// linear.
 const LINEAR: f32 = 0.02;
 
+/// How urgent blocks are, for the range of their light: those that are known to be complex and their parts, those that seem simple, and
+/// smooth ones; an elementary edge block has 1. Less for simple ones misses what is inside, more looks again at what is good
+/// already.
+const KNOWN: f32 = 3.0;
+const SIMPLE: f32 = 0.05;
+const SMOOTH: f32 = 0.1;
+
+/// What a line is taken to hide, as a part of the light around it.
+const HIDDEN: f32 = 0.5;
+
+/// What the parts of a complex block are taken to have at least of its range.
+const INHERITED: f32 = 0.5;
+
 /// Luminance, as shown, that contrast is at least told in comparison to: a step of a display, below which nothing is seen.
 const DARK: f32 = 1.0 / 255.0;
 
@@ -52,16 +65,15 @@ const FIRST_BATCH: usize = 512;
 /// Part of all pixels so far that a batch adds: less is more often told anew what is urgent.
 const GROWTH: usize = 8;
 
-/// Rows of the picture that are made at once; fewer have more rows of the work image in common with their neighbours.
-const BAND: u32 = 32;
-
 /// What a coherence map is asked for.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CoherenceOptions {
     /// Pixels of the work image along a side of each of the picture's, at least 1 (Guo has 3).
     pub supersample: u32,
-    /// Light is compared as it shows it.
-    pub display: Display,
+    /// What light is exposed with before it is compared: white is 1.
+    pub exposure: Exposure,
+    /// Of a picture for a display, the curve that light is compared by; without one it is compared beyond white, too.
+    pub curve: Option<ToneCurve>,
 }
 
 /// A coherence map in the making.
@@ -69,26 +81,27 @@ pub struct CoherenceOptions {
 /// Asked for a batch of points ([`CoherenceMap::next_batch`]) and told what is seen there ([`CoherenceMap::take`]), until there
 /// are none: then every pixel of the work image is evaluated.
 pub struct CoherenceMap {
-    options: CoherenceOptions,
-    image: WorkImage,
+    pub(crate) options: CoherenceOptions,
+    pub(crate) image: WorkImage,
+    lines: LineGrid,
     /// They fill the image.
-    leaves: Vec<Leaf>,
+    pub(crate) leaves: Vec<Leaf>,
     batch: Vec<[u32; 2]>,
     excluded: u64,
 }
 
 /// A block that is not parted.
 #[derive(Clone, Copy, Debug)]
-struct Leaf {
-    block: Block,
-    kind: Kind,
+pub(crate) struct Leaf {
+    pub block: Block,
+    pub kind: Kind,
     /// Larger is looked at first; 0 where nothing is left to do.
     urgency: f32,
 }
 
 /// What a block is taken for.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Kind {
+pub(crate) enum Kind {
     /// Known at its corners.
     Smooth,
     /// Crossed by something; its boundary is being evaluated.
@@ -112,16 +125,18 @@ enum Step {
 }
 
 impl CoherenceMap {
-    /// Begins a map for a picture of so many pixels. None without pixels or supersamples, and of a work image with more than
+    /// Begins a map for a picture of so many pixels, in which lines are known that may be edges. None without pixels or supersamples, and of a work image with more than
     /// [`MOST_PIXELS`] to a side.
-    pub fn new(width: u32, height: u32, options: &CoherenceOptions) -> Option<Self> {
+    pub fn new(width: u32, height: u32, options: &CoherenceOptions, lines: &[VisibleLine]) -> Option<Self> {
         let [width, height] = [width, height].map(|side| side.checked_mul(options.supersample).unwrap_or(0));
         if ![width, height].iter().all(|side| (1..=MOST_PIXELS).contains(side)) {
             return None;
         }
         let whole = Block { low: [0, 0], high: [width - 1, height - 1] };
         let leaves = vec![Leaf { block: whole, kind: Kind::Smooth, urgency: f32::INFINITY }];
-        Some(Self { options: *options, image: WorkImage::new(width, height), leaves, batch: Vec::new(), excluded: 0 })
+        let lines = LineGrid::new(lines, [width, height], options.supersample);
+        let image = WorkImage::new(width, height);
+        Some(Self { options: *options, image, lines, leaves, batch: Vec::new(), excluded: 0 })
     }
 
     /// The points to be looked at next, at most so many, in pixels of the picture; none when all are evaluated.
@@ -166,10 +181,20 @@ impl CoherenceMap {
         self.image.evaluated()
     }
 
+    /// Columns and rows of the work image.
+    pub fn work_size(&self) -> [u32; 2] {
+        self.image.size()
+    }
+
     /// All of its pixels.
     pub fn pixels(&self) -> usize {
         let [width, height] = self.image.size().map(|side| side as usize);
         width * height
+    }
+
+    /// Pixels that are evaluated, at least, before blocks are elementary: with fewer the picture is worth little.
+    pub fn least(&self) -> usize {
+        self.image.size().map(|side| (side - 1).div_ceil(ELEMENTARY) as usize + 1).iter().product()
     }
 
     /// Evaluated pixels whose radiance was no finite number.
@@ -180,30 +205,6 @@ impl CoherenceMap {
     /// Memory of evaluated pixels and blocks, bytes.
     pub fn bytes(&self) -> usize {
         self.image.bytes() + self.leaves.capacity() * size_of::<Leaf>()
-    }
-
-    /// The picture so far, row by row: radiance, W·sr⁻¹·m⁻², or what a display shows, through a filter. Of the work image no more than
-    /// strips are made.
-    pub fn picture(&self, filter: Filter, display: Option<Display>) -> Vec<Vec3> {
-        let [width, height] = self.image.size();
-        let reduction = Reduction::new(filter, self.options.supersample);
-        let rows = height / self.options.supersample;
-        let in_strips = self.leaves_in_strips();
-        let band = |first: u32| {
-            let rows = first * BAND..rows.min((first + 1) * BAND);
-            let of_work = reduction.rows(&rows, height);
-            let mut strip = self.strip(&of_work, &in_strips);
-            if let Some(display) = display {
-                strip.iter_mut().for_each(|radiance| *radiance = display.light(*radiance));
-            }
-            reduction.reduce(&rows, width, &strip, &of_work)
-        };
-        (0..rows.div_ceil(BAND)).into_par_iter().flat_map_iter(band).collect()
-    }
-
-    /// The work image as far as it is known, row by row: radiance, W·sr⁻¹·m⁻².
-    pub fn work_image(&self) -> Vec<Vec3> {
-        self.strip(&(0..self.image.size()[1]), &self.leaves_in_strips())
     }
 
     /// How many of its pixels in the work image are evaluated, for each of the picture, row by row.
@@ -224,7 +225,13 @@ impl CoherenceMap {
 
     /// The luminance that a display shows.
     fn shown(&self, radiance: Vec3) -> f32 {
-        luminance(self.options.display.light(radiance).as_dvec3()) as f32
+        luminance(self.compared(radiance).as_dvec3()) as f32
+    }
+
+    /// Light as it is compared: exposed, and by the curve of a display.
+    fn compared(&self, radiance: Vec3) -> Vec3 {
+        let CoherenceOptions { exposure, curve, .. } = self.options;
+        curve.map_or(radiance * exposure.factor(), |curve| Display::new(exposure, curve).light(radiance))
     }
 
     fn look(&self, pixel: [u32; 2]) -> Option<(f32, u32)> {
@@ -260,10 +267,13 @@ impl CoherenceMap {
         let block = self.leaves[leaf].block;
         match step {
             Step::Evaluate(pixels) => self.batch.extend(pixels),
-            Step::Is(kind) => self.leaves[leaf] = self.leaf(block, kind),
+            Step::Is(kind) => self.leaves[leaf] = self.leaf(block, kind, 0.0),
             Step::Done => self.leaves[leaf].urgency = 0.0,
             Step::Part(kind) => {
-                let mut parts = block.parts().map(|part| self.leaf(part, kind)).collect::<Vec<Leaf>>().into_iter();
+                let [low, high] = if kind == Kind::Edge { self.range(&block) } else { [0.0; 2] };
+                let expected = INHERITED * (high - low);
+                let mut parts =
+                    block.parts().map(|part| self.leaf(part, kind, expected)).collect::<Vec<Leaf>>().into_iter();
                 if let Some(first) = parts.next() {
                     self.leaves[leaf] = first;
                 }
@@ -273,39 +283,44 @@ impl CoherenceMap {
     }
 
     /// A block whose corners are evaluated, as far as its kind is known; a smooth one is classified.
-    fn leaf(&self, block: Block, kind: Kind) -> Leaf {
+    fn leaf(&self, block: Block, kind: Kind, expected: f32) -> Leaf {
         let corners = block.corners().map(|corner| self.look(corner).unwrap_or_default());
         let is_edge = kind == Kind::Smooth && block.is_elementary() && {
             contrast(corners.iter().map(|corner| corner.0)) > CONTRAST
                 || corners.iter().any(|corner| corner.1 != corners[0].1)
+                || self.lines.crosses(&block)
         };
         let kind = if is_edge { Kind::Edge } else { kind };
-        Leaf { block, kind, urgency: self.urgency(&block, kind) }
+        Leaf { block, kind, urgency: self.urgency(&block, kind, expected) }
     }
 
-    /// What may be gained by a look at a block.
-    fn urgency(&self, block: &Block, kind: Kind) -> f32 {
-        let side = block.sides().into_iter().max().unwrap_or(0) as f32;
+    /// What may be gained by a look at a block: about the light that may be off there, for each pixel that the look takes.
+    fn urgency(&self, block: &Block, kind: Kind, expected: f32) -> f32 {
+        let side = block.sides().into_iter().max().unwrap_or(0);
         if block.is_pixel() {
             return 0.0;
         }
         if !block.is_elementary() {
             return f32::INFINITY;
         }
-        let (mut low, mut high) = (f32::MAX, 0f32);
-        for step in 0..block.perimeter() {
-            if let Some((light, _)) = self.look(block.on_boundary(step)) {
-                (low, high) = (low.min(light), high.max(light));
-            }
-        }
-        let range = high - low;
-        let eight = ELEMENTARY as f32;
+        let [low, high] = self.range(block);
+        let of_elementary = side as f32 / ELEMENTARY as f32;
         match kind {
-            Kind::Edge if side > eight / 2.0 => 1e3 + range,
-            Kind::Edge | Kind::Complex { .. } => (range + DARK) * (side / eight),
-            Kind::Simple { grid, .. } => 0.3 * (range + DARK) * (grid as f32 / eight),
-            Kind::Smooth => 0.3 * (range + 0.1 * DARK) * (side / eight),
+            Kind::Edge if side > ELEMENTARY / 2 => {
+                // What a line parts may be as dark as it likes.
+                let hidden = if self.lines.crosses(block) { HIDDEN * high } else { 0.0 };
+                (high - low).max(hidden) + DARK
+            }
+            Kind::Edge | Kind::Complex { .. } => KNOWN * ((high - low).max(expected) + DARK) * of_elementary,
+            Kind::Simple { grid, .. } => SIMPLE * (high - low + DARK) * (grid as f32 / ELEMENTARY as f32),
+            Kind::Smooth => SMOOTH * (high - low + 0.1 * DARK) * of_elementary,
         }
+    }
+
+    /// The darkest and brightest of a block's boundary, as far as it is evaluated.
+    fn range(&self, block: &Block) -> [f32; 2] {
+        let seen = (0..block.perimeter()).filter_map(|step| self.look(block.on_boundary(step)));
+        seen.fold([f32::MAX, 0.0], |[low, high], (light, _)| [low.min(light), high.max(light)])
     }
 
     fn step(&self, leaf: &Leaf) -> Step {
@@ -381,12 +396,14 @@ impl CoherenceMap {
         let is_bent = (half.0 - said).abs() > LINEAR * (half.0 + DARK);
         for (ends, part) in [([first, half], side.start..middle), ([half, last], middle..side.end)] {
             let differs = contrast(ends.iter().map(|end| end.0)) > FINE_CONTRAST;
-            self.bisect(at, part, ends[0].1 != ends[1].1 || (is_bent && differs), missing);
+            let block = Block { low: at(part.start), high: at(part.end) };
+            let is_wanted = ends[0].1 != ends[1].1 || (is_bent && differs) || self.lines.crosses(&block);
+            self.bisect(at, part, is_wanted, missing);
         }
     }
 
     fn direction(&self, boundary: &Boundary) -> u8 {
-        boundary.least_discrepancy(|radiance| self.options.display.light(radiance))
+        boundary.least_discrepancy(|radiance| self.compared(radiance))
     }
 
     /// Looks at a simple block on the next finer grid: it stays simple while its element says what is there.
@@ -418,92 +435,10 @@ impl CoherenceMap {
             self.parted(block, Kind::Edge)
         }
     }
-
-    /// By elementary rows, the leaves that have pixels in them.
-    fn leaves_in_strips(&self) -> Vec<Vec<u32>> {
-        let mut strips = vec![Vec::new(); self.image.size()[1].div_ceil(ELEMENTARY) as usize];
-        for (number, leaf) in (0..).zip(&self.leaves) {
-            let rows = self.own(&leaf.block)[1].clone();
-            for strip in &mut strips[(rows.start / ELEMENTARY) as usize..rows.end.div_ceil(ELEMENTARY) as usize] {
-                strip.push(number);
-            }
-        }
-        strips
-    }
-
-    /// Columns and rows of the pixels that are a block's own: those on its right and lower side are its neighbours', if there are any.
-    fn own(&self, block: &Block) -> [Range<u32>; 2] {
-        let size = self.image.size();
-        [0, 1].map(|axis| {
-            let is_last = block.high[axis] + 1 == size[axis];
-            block.low[axis]..block.high[axis] + u32::from(is_last)
-        })
-    }
-
-    /// Rows of the work image.
-    fn strip(&self, rows: &Range<u32>, in_strips: &[Vec<u32>]) -> Vec<Vec3> {
-        let width = self.image.size()[0] as usize;
-        let mut strip = vec![Vec3::ZERO; width * rows.len()];
-        if self.image.evaluated() == 0 {
-            return strip;
-        }
-        let mut put = |[x, y]: [u32; 2], radiance: Vec3| {
-            if rows.contains(&y) {
-                strip[(y - rows.start) as usize * width + x as usize] = radiance;
-            }
-        };
-        for some in (rows.start / ELEMENTARY)..rows.end.div_ceil(ELEMENTARY) {
-            let of_strip = (some * ELEMENTARY).max(rows.start)..((some + 1) * ELEMENTARY).min(rows.end);
-            for &leaf in &in_strips[some as usize] {
-                let leaf = &self.leaves[leaf as usize];
-                let [columns, own_rows] = self.own(&leaf.block);
-                let own_rows = own_rows.start.max(of_strip.start)..own_rows.end.min(of_strip.end);
-                self.draw(leaf, columns, own_rows, &mut put);
-            }
-        }
-        for (pixel, evaluated) in self.image.in_rows(rows.clone()) {
-            put(pixel, evaluated.radiance);
-        }
-        strip
-    }
-
-    /// Light of some of a leaf's pixels.
-    fn draw(&self, leaf: &Leaf, columns: Range<u32>, rows: Range<u32>, put: &mut impl FnMut([u32; 2], Vec3)) {
-        let block = &leaf.block;
-        let pixels = rows.flat_map(|y| columns.clone().map(move |x| [x, y]));
-        let sides = block.sides().map(|side| side.max(1) as f32);
-        let corners = block.corners().map(|corner| self.image.get(corner).map_or(Vec3::ZERO, |pixel| pixel.radiance));
-        let bilinear = |pixel: [u32; 2]| {
-            let part = place(block, pixel) / Vec2::from_array(sides);
-            corners[0].lerp(corners[1], part.x).lerp(corners[3].lerp(corners[2], part.x), part.y)
-        };
-        if !block.is_elementary() || block.sides().contains(&0) {
-            return pixels.for_each(|pixel| put(pixel, bilinear(pixel)));
-        }
-        let boundary = Boundary::of(block, &self.image);
-        let direction = match leaf.kind {
-            Kind::Smooth if !boundary.is_refined => return pixels.for_each(|pixel| put(pixel, bilinear(pixel))),
-            Kind::Smooth => None,
-            Kind::Simple { direction, .. } | Kind::Complex { direction } => Some(direction),
-            Kind::Edge => Some(self.direction(&boundary)),
-        };
-        for pixel in pixels {
-            let place = place(block, pixel);
-            let is_inner = pixel[0] != block.low[0]
-                && pixel[1] != block.low[1]
-                && pixel[0] != block.high[0]
-                && pixel[1] != block.high[1];
-            let radiance = match direction {
-                Some(index) if is_inner => boundary.along(unit_vector(index), place),
-                _ => boundary.blended(place),
-            };
-            put(pixel, radiance);
-        }
-    }
 }
 
 /// Where a pixel lies in a block, steps from its upper left corner.
-fn place(block: &Block, [x, y]: [u32; 2]) -> Vec2 {
+pub(crate) fn place(block: &Block, [x, y]: [u32; 2]) -> Vec2 {
     Vec2::new((x - block.low[0]) as f32, (y - block.low[1]) as f32)
 }
 
@@ -521,10 +456,11 @@ fn contrast(luminances: impl Iterator<Item = f32>) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use scene::{Exposure, ToneCurve};
+    use crate::filter::Filter;
+    use crate::reduction::Reduction;
 
     fn usual(supersample: u32) -> CoherenceOptions {
-        CoherenceOptions { supersample, display: Display::new(Exposure { ev: 0.0 }, ToneCurve::Shoulder) }
+        CoherenceOptions { supersample, exposure: Exposure { ev: 0.0 }, curve: Some(ToneCurve::Shoulder) }
     }
 
     /// A bright disk of 13.5 pixels about (20, 15) on a ground whose brightness rises to the right.
@@ -541,7 +477,7 @@ mod tests {
         most: usize,
         evaluate: &dyn Fn(DVec2) -> Evaluation,
     ) -> CoherenceMap {
-        let mut map = CoherenceMap::new(size.0, size.1, &usual(supersample)).expect("the size is one");
+        let mut map = CoherenceMap::new(size.0, size.1, &usual(supersample), &[]).expect("the size is one");
         loop {
             let batch = map.next_batch(most - map.evaluated());
             if batch.is_empty() {
@@ -571,13 +507,13 @@ mod tests {
         for (width, height, supersample) in
             [(0, 0, 3), (0, 9, 3), (9, 0, 3), (9, 9, 0), (MOST_PIXELS, 1, 2), (u32::MAX, 1, 3)]
         {
-            assert!(CoherenceMap::new(width, height, &usual(supersample)).is_none());
+            assert!(CoherenceMap::new(width, height, &usual(supersample), &[]).is_none());
         }
     }
 
     #[test]
     fn before_anything_is_seen_the_picture_is_black() {
-        let mut map = CoherenceMap::new(5, 4, &usual(3)).expect("a picture");
+        let mut map = CoherenceMap::new(5, 4, &usual(3), &[]).expect("a picture");
         assert_eq!(map.picture(Filter::Gaussian, None), [Vec3::ZERO; 20]);
         assert!(map.next_batch(0).is_empty());
     }
@@ -602,7 +538,7 @@ mod tests {
 
     #[test]
     fn no_evaluated_pixel_is_ever_overwritten() {
-        let mut map = CoherenceMap::new(48, 32, &usual(1)).expect("a picture");
+        let mut map = CoherenceMap::new(48, 32, &usual(1), &[]).expect("a picture");
         let mut seen_so_far = Vec::new();
         loop {
             let batch = map.next_batch(usize::MAX);
@@ -663,7 +599,10 @@ mod tests {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
             pool.install(|| {
                 let map = refined((200, 150), 2, 20_000, &disk);
-                (map.samples_per_pixel(), map.picture(Filter::Lanczos, Some(usual(2).display)))
+                (
+                    map.samples_per_pixel(),
+                    map.picture(Filter::Lanczos, Some(Display::new(Exposure { ev: 0.0 }, ToneCurve::Shoulder))),
+                )
             })
         };
         let one = image(1);
@@ -692,7 +631,7 @@ mod tests {
     /// Interrupted in the middle of a batch: what was seen counts, and it goes on.
     #[test]
     fn a_part_of_a_batch_may_be_taken() {
-        let mut map = CoherenceMap::new(48, 32, &usual(3)).expect("a picture");
+        let mut map = CoherenceMap::new(48, 32, &usual(3), &[]).expect("a picture");
         let batch = map.next_batch(100);
         map.take(&batch.iter().take(3).map(|&point| disk(point)).collect::<Vec<Evaluation>>());
         assert_eq!(map.evaluated(), 3);

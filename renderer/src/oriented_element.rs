@@ -145,3 +145,54 @@ fn fill_between(values: &mut [Vec3], first: usize, last: usize) {
         *value = from.lerp(to, step as f32 / steps);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::work_image::WorkPixel;
+
+    /// A block in an image whose boundary is evaluated, all or the corners alone.
+    fn block_of(high: [u32; 2], all: bool, light: impl Fn(f32, f32) -> f32) -> (Block, Boundary) {
+        let block = Block { low: [3, 2], high: [3 + high[0], 2 + high[1]] };
+        let mut image = WorkImage::new(20, 20);
+        let around = (0..block.perimeter()).map(|step| block.on_boundary(step));
+        for [x, y] in around.filter(|pixel| all || block.corners().contains(pixel)) {
+            let radiance = Vec3::splat(light((x - 3) as f32, (y - 2) as f32));
+            image.insert([x, y], WorkPixel { radiance, object: 1 });
+        }
+        let boundary = Boundary::of(&block, &image);
+        (block, boundary)
+    }
+
+    #[test]
+    fn a_plane_is_kept_along_every_direction_in_blocks_of_any_shape() {
+        let plane = |x: f32, y: f32| 0.3 + 0.02 * x - 0.01 * y;
+        for high in [[8, 8], [4, 4], [7, 3], [1, 8], [2, 2]] {
+            for all in [true, false] {
+                let (_, boundary) = block_of(high, all, plane);
+                assert_eq!(boundary.is_refined, all && high != [1, 1]);
+                for (x, y) in (1..high[0]).flat_map(|x| (1..high[1]).map(move |y| (x as f32, y as f32))) {
+                    assert!((boundary.blended(Vec2::new(x, y)).x - plane(x, y)).abs() < 1e-6);
+                    for direction in 0..DIRECTIONS as u8 {
+                        let along = boundary.along(unit_vector(direction), Vec2::new(x, y)).x;
+                        assert!((along - plane(x, y)).abs() < 1e-6, "{high:?} {direction} ({x}, {y})");
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_direction_of_an_edge_is_that_of_least_discrepancy() {
+        for index in 0..DIRECTIONS as u8 {
+            let normal = unit_vector(index).perp();
+            let edge = |x: f32, y: f32| ((Vec2::new(x, y) - 4.1).dot(normal) / 2.0 + 0.5).clamp(0.0, 1.0);
+            let (_, boundary) = block_of([8, 8], true, edge);
+            assert_eq!(boundary.least_discrepancy(|light| light), index);
+            for (x, y) in (1..8).flat_map(|x| (1..8).map(move |y| (x as f32, y as f32))) {
+                let off = boundary.along(unit_vector(index), Vec2::new(x, y)).x - edge(x, y);
+                assert!(off.abs() < 0.15, "{index} ({x}, {y}): {off}");
+            }
+        }
+    }
+}

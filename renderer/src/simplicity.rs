@@ -140,3 +140,56 @@ fn nearest_step(around: &Block, pixel: [u32; 2]) -> i32 {
     };
     (0..around.perimeter()).min_by_key(|&step| distance(step)).unwrap_or(0) as i32
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const BLOCK: Block = Block { low: [0, 0], high: [8, 8] };
+
+    /// What the tests say of a block whose every pixel may be looked at.
+    fn told(see: impl Fn(f32, f32) -> (f32, u32)) -> Simplicity {
+        let look = |[x, y]: [u32; 2]| see(x as f32, y as f32);
+        let values: Vec<(f32, u32)> = (0..BLOCK.perimeter()).map(|step| look(BLOCK.on_boundary(step))).collect();
+        simplicity(&BLOCK, &values, false, &|pixel| Some(look(pixel)))
+    }
+
+    fn light(is_bright: bool) -> (f32, u32) {
+        (if is_bright { 0.8 } else { 0.2 }, 1)
+    }
+
+    #[test]
+    fn straight_edges_at_any_angle_are_simple() {
+        assert_eq!(told(|_, _| light(true)), Simplicity::Simple);
+        for angle in 0..32 {
+            let normal = Vec2::from_angle(angle as f32 * std::f32::consts::PI / 16.0);
+            let edge = told(|x, y| light((Vec2::new(x, y) - 4.2).dot(normal) > 0.0));
+            assert_eq!(edge, Simplicity::Simple, "{angle}");
+        }
+    }
+
+    #[test]
+    fn corners_bars_and_a_third_object_are_complex() {
+        assert_eq!(told(|x, y| light(x > 5.5 && y < 2.5)), Simplicity::Complex, "a corner");
+        assert_eq!(told(|x, _| light((2.5..5.5).contains(&x))), Simplicity::Complex, "a bar");
+        assert_eq!(told(|x, _| (0.5, x as u32 / 3)), Simplicity::Complex, "three objects");
+        assert_eq!(told(|x, _| (0.5, x as u32 / 5)), Simplicity::Simple, "two");
+    }
+
+    #[test]
+    fn noise_of_one_pixel_is_no_edge_and_faint_noise_none_at_all() {
+        let speck = |x: f32, y: f32| light(x > 4.5 || (x, y) == (0.0, 4.0));
+        assert_eq!(told(speck), Simplicity::Simple);
+        let noise: Vec<(f32, u32)> = (0..32).map(|i| (0.5 + 0.001 * (i * 7 % 5) as f32, 1)).collect();
+        assert_eq!(simplicity(&BLOCK, &noise, true, &|_| None), Simplicity::Simple);
+    }
+
+    #[test]
+    fn of_the_inner_layer_pixels_at_the_transitions_are_asked_for() {
+        let values: Vec<(f32, u32)> = (0..32).map(|step| light(BLOCK.on_boundary(step)[0] > 4)).collect();
+        let Simplicity::Wants(pixels) = simplicity(&BLOCK, &values, false, &|_| None) else {
+            panic!("nothing is known")
+        };
+        assert_eq!(pixels, [[4, 1], [5, 1], [5, 7], [4, 7]]);
+    }
+}
