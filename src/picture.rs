@@ -5,7 +5,8 @@ use std::time::Instant;
 use glam::{DVec2, Vec3};
 use rayon::prelude::*;
 use renderer::{
-    AdaptiveOptions, AdaptiveSampler, Evaluation, Evaluator, Film, Filter, ScatteredFilm, Surface, Tile, UniformSampler,
+    AdaptiveOptions, AdaptiveSampler, CoherenceMap, Evaluation, Evaluator, Film, Filter, ScatteredFilm, Surface, Tile,
+    UniformSampler,
 };
 use scene::{Display, encode_srgb};
 use serde::Serialize;
@@ -19,7 +20,8 @@ const CHUNK: usize = 1024;
 /// A picture in the making.
 pub struct Picture {
     sampler: Sampler,
-    film: Reconstruction,
+    /// None where the sampler makes its own picture.
+    film: Option<Reconstruction>,
     /// Rays of all samples, those from the eye included.
     rays: u64,
     seconds: Seconds,
@@ -51,13 +53,19 @@ impl Picture {
             sampler.points().map(|(point, radiance)| (point, seen(radiance))).unzip();
         film.add(&points, &first, &sampler.tiles());
         let sampler = Sampler::Adaptive(Box::new(sampler));
-        Some(Self { rays: sampler.samples(), sampler, film, seconds: Seconds::default() })
+        Some(Self { rays: sampler.samples(), sampler, film: Some(film), seconds: Seconds::default() })
     }
 
     /// One with so many samples a pixel, spread evenly. None of a size that cannot be.
     pub fn uniform((width, height): (u32, u32), a_pixel: f64, seed: u64, film: Reconstruction) -> Option<Self> {
         let sampler = Sampler::Uniform(UniformSampler::new(width, height, a_pixel, seed)?);
-        Some(Self { rays: 0, sampler, film, seconds: Seconds::default() })
+        Some(Self { rays: 0, sampler, film: Some(film), seconds: Seconds::default() })
+    }
+
+    /// One of a coherence map, through a filter: of what a display shows, or of radiance.
+    pub fn coherent(map: CoherenceMap, filter: Filter, display: Option<Display>) -> Self {
+        let sampler = Sampler::Coherent { map: Box::new(map), filter, display };
+        Self { rays: 0, sampler, film: None, seconds: Seconds::default() }
     }
 
     /// Takes a batch of samples, at most so many, fewer if it gets late; false if there is nothing left to do.
@@ -70,13 +78,18 @@ impl Picture {
         let seen = timed(&mut self.seconds.evaluate, || seen_at(&batch, evaluate, late));
         self.rays += seen.iter().map(|evaluation| u64::from(evaluation.cost)).sum::<u64>();
         let tiles = timed(&mut self.seconds.generate, || self.sampler.take(&seen));
-        timed(&mut self.seconds.reconstruct, || self.film.add(&batch, &seen, &tiles));
+        if let Some(film) = &mut self.film {
+            timed(&mut self.seconds.reconstruct, || film.add(&batch, &seen, &tiles));
+        }
         true
     }
 
     /// The picture so far, row by row: radiance, W·sr⁻¹·m⁻², or what a display shows.
     pub fn light(&mut self) -> Vec<Vec3> {
-        timed(&mut self.seconds.reconstruct, || self.film.picture())
+        timed(&mut self.seconds.reconstruct, || match (&self.sampler, &self.film) {
+            (Sampler::Coherent { map, filter, display }, _) => map.picture(*filter, *display),
+            (_, film) => film.as_ref().map_or_else(Vec::new, Reconstruction::picture),
+        })
     }
 
     /// Samples so far.
@@ -94,6 +107,15 @@ impl Picture {
         match &self.sampler {
             Sampler::Adaptive(sampler) => sampler.excluded(),
             Sampler::Uniform(sampler) => sampler.excluded(),
+            Sampler::Coherent { map, .. } => map.excluded(),
+        }
+    }
+
+    /// The coherence map, if it is one's picture.
+    pub fn map(&self) -> Option<&CoherenceMap> {
+        match &self.sampler {
+            Sampler::Coherent { map, .. } => Some(map),
+            Sampler::Adaptive(_) | Sampler::Uniform(_) => None,
         }
     }
 
@@ -101,7 +123,7 @@ impl Picture {
     pub fn closed_share(&self) -> Option<f64> {
         match &self.sampler {
             Sampler::Adaptive(sampler) => Some(sampler.closed_share()),
-            Sampler::Uniform(_) => None,
+            Sampler::Uniform(_) | Sampler::Coherent { .. } => None,
         }
     }
 
@@ -110,6 +132,7 @@ impl Picture {
         match &self.sampler {
             Sampler::Adaptive(sampler) => sampler.samples_per_pixel(),
             Sampler::Uniform(sampler) => sampler.samples_per_pixel(),
+            Sampler::Coherent { map, .. } => map.samples_per_pixel(),
         }
     }
 
@@ -119,10 +142,11 @@ impl Picture {
     }
 }
 
-/// A sampler of either kind.
+/// A sampler of any kind.
 enum Sampler {
     Adaptive(Box<AdaptiveSampler>),
     Uniform(UniformSampler),
+    Coherent { map: Box<CoherenceMap>, filter: Filter, display: Option<Display> },
 }
 
 impl Sampler {
@@ -130,6 +154,7 @@ impl Sampler {
         match self {
             Self::Adaptive(sampler) => sampler.next_batch(most),
             Self::Uniform(sampler) => sampler.next_batch(most.min(CHUNK)),
+            Self::Coherent { map, .. } => map.next_batch(most),
         }
     }
 
@@ -137,6 +162,10 @@ impl Sampler {
         match self {
             Self::Adaptive(sampler) => sampler.take(seen),
             Self::Uniform(sampler) => sampler.take(seen),
+            Self::Coherent { map, .. } => {
+                map.take(seen);
+                Vec::new()
+            }
         }
     }
 
@@ -144,6 +173,7 @@ impl Sampler {
         match self {
             Self::Adaptive(sampler) => sampler.samples() as u64,
             Self::Uniform(sampler) => sampler.samples(),
+            Self::Coherent { map, .. } => map.evaluated() as u64,
         }
     }
 }

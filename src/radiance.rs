@@ -3,8 +3,10 @@
 use std::sync::Arc;
 
 use anyhow::{Result, bail, ensure};
-use renderer::{Evaluator, Eye, PathLight, PathOptions, SurfacePoint, Whitted};
-use scene::{Baked, Bvh, Camera, Provenance, Rgb, Scene};
+use renderer::{
+    Evaluator, Eye, PathLight, PathOptions, SurfacePoint, VisibleLine, Whitted, object_edges, visible_lines,
+};
+use scene::{Baked, Bvh, Camera, DiscontinuityLine, Provenance, Rgb, Scene};
 use solver::{Gather, Solution};
 
 use crate::args::{LightFlags, RadianceChoice, RadianceFlags, RenderFlags};
@@ -60,12 +62,31 @@ impl View {
     }
 }
 
-/// Makes an evaluator of the view that flags ask for, and has `work` use it.
+/// Lines of a view that may be edges of its picture.
+pub struct Lines<'a> {
+    view: &'a View,
+    scene: &'a Scene,
+    /// Of the bake, where there is one: edges of shadows.
+    discontinuities: &'a [DiscontinuityLine],
+}
+
+impl Lines<'_> {
+    /// Those that are visible.
+    pub fn visible(&self) -> Vec<VisibleLine> {
+        let bvh = Bvh::of_scene(self.scene);
+        let eye = self.view.eye(self.scene, &bvh);
+        let mut segments = object_edges(&eye);
+        segments.extend(self.discontinuities.iter().map(|line| line.ends.map(|end| end.as_dvec3())));
+        visible_lines(&eye, &segments)
+    }
+}
+
+/// Makes an evaluator of the view that flags ask for, and has `work` use it, with the lines that are seen.
 pub fn with_evaluator<T>(
     input: Input,
     flags: &RenderFlags,
     outputs: &Outputs,
-    work: impl FnOnce(&Evaluator<'_>) -> Result<T>,
+    work: impl FnOnce(&Evaluator<'_>, &Lines<'_>) -> Result<T>,
 ) -> Result<T> {
     let asked = LightFlags { bounces: flags.radiance.bounces, ..LightFlags::default() };
     if flags.radiance.radiance == RadianceChoice::Interpolant {
@@ -73,13 +94,17 @@ pub fn with_evaluator<T>(
             check_bounces(flags, &baked.provenance)?;
         }
         let baked = input.into_baked(&flags.input, &asked, outputs)?;
-        return by_interpolants(&baked, &View::of(flags, &baked.scene)?, work);
+        let view = View::of(flags, &baked.scene)?;
+        let lines = Lines { view: &view, scene: &baked.scene, discontinuities: &baked.lines };
+        return by_interpolants(&baked, &view, |evaluate| work(evaluate, &lines));
     }
-    let (scene, made) = match input {
-        Input::Scene(scene) => (scene, None),
-        Input::Baked(baked) => (baked.scene, Some(baked.provenance)),
+    let (scene, discontinuities, made) = match input {
+        Input::Scene(scene) => (scene, Vec::new(), None),
+        Input::Baked(baked) => (baked.scene, baked.lines, Some(baked.provenance)),
     };
     let view = View::of(flags, &scene)?;
+    let lines = Lines { view: &view, scene: &scene, discontinuities: &discontinuities };
+    let work = |evaluate: &Evaluator<'_>| work(evaluate, &lines);
     if flags.radiance.radiance == RadianceChoice::Whitted {
         ensure!(
             scene.emitters().next().is_some() || !scene.lights.is_empty(),

@@ -1,23 +1,27 @@
 //! `halflight render`: a picture from samples of the image plane, each along a ray.
 
+use std::path::Path;
 use std::time::Instant;
 
 use anyhow::{Context, Result, bail};
 use formats::FormatError;
-use glam::DVec2;
+use glam::{DVec2, Vec3};
 use rayon::prelude::*;
-use renderer::{AdaptiveOptions, Evaluation, Evaluator, sample_histogram, sample_map};
+use renderer::{
+    AdaptiveOptions, CoherenceMap, CoherenceOptions, Evaluation, Evaluator, Filter, sample_histogram, sample_map,
+};
 use scene::{Display, Exposure, luminance};
 use serde::Serialize;
 
-use crate::args::{Budget, ExposureChoice, ImageKind, RenderFlags, SamplerChoice};
+use crate::args::{Budget, ExposureChoice, ImageKind, Interpolation, RenderFlags, SamplerChoice};
+use crate::compare::relative_norms;
 use crate::failure::{Outcome, Usage};
 use crate::input::Input;
 use crate::interrupt::Interrupt;
 use crate::output::{Output, Outputs};
 use crate::picture::{Picture, Reconstruction, Seconds, encoded};
 use crate::progress::{Stage, say};
-use crate::radiance;
+use crate::radiance::{self, Lines};
 use crate::report::print_json;
 use crate::sky;
 
@@ -26,6 +30,9 @@ const FULL: f64 = 4.0;
 
 /// Columns and rows of the grid that the light of a picture is metered on, as `shot` has it.
 const METER_GRID: u32 = 32;
+
+/// Pixels of a coherence map's work image along a side of each of the picture's: Guo's.
+const SUPERSAMPLE: u32 = 3;
 
 /// Samples of the first snapshot.
 const FIRST_SNAPSHOT: u64 = 1024;
@@ -37,20 +44,26 @@ pub fn run(flags: &RenderFlags, outputs: &Outputs, interrupt: &Interrupt) -> Res
     }
     flags.camera.viewpoint()?;
     radiance::check(&flags.radiance)?;
+    check(flags)?;
     let limit = Limit::of(flags)?;
+    let full = flags.compare.as_deref().map(|path| full_picture(path, flags.size)).transpose()?;
     let output = outputs.claim(&flags.output)?;
+    let coherence = flags.coherence.map.as_deref().map(|path| outputs.claim(path)).transpose()?;
     let map = flags.sample_map.as_deref().map(|path| outputs.claim(path)).transpose()?;
     if let Some(folder) = &flags.snapshots {
         std::fs::create_dir_all(folder).with_context(|| format!("cannot make the folder {}", folder.display()))?;
     }
     let input = Input::read(&flags.input, flags.reading)?;
-    radiance::with_evaluator(input, flags, outputs, |evaluate| {
+    radiance::with_evaluator(input, flags, outputs, |evaluate, lines| {
         let exposure = match flags.exposure {
             ExposureChoice::Fixed(exposure) => exposure,
             ExposureChoice::Auto => meter(evaluate, flags.size),
         };
         let display = Display::new(exposure, flags.tone_curve);
-        let mut picture = begin(flags, display, &limit, evaluate)?;
+        let mut picture = match flags.sampler {
+            SamplerChoice::CoherenceMap => begin_coherent(flags, exposure, &limit, lines)?,
+            _ => begin(flags, display, &limit, evaluate)?,
+        };
         let snapshot = |picture: &mut Picture| -> Result<()> {
             let Some(folder) = &flags.snapshots else { return Ok(()) };
             let name = format!("{:012}", picture.samples());
@@ -59,8 +72,40 @@ pub fn run(flags: &RenderFlags, outputs: &Outputs, interrupt: &Interrupt) -> Res
         };
         interrupt.heeded_by(|| sample(&mut picture, &limit, evaluate, interrupt, &snapshot))?;
         write(&mut picture, flags.size, &output)?;
-        report(&picture, flags, exposure, map.as_ref(), interrupt.pressed())
+        if let (Some(output), Some(map)) = (&coherence, picture.map()) {
+            let [width, height] = map.work_size();
+            output.write(|path| formats::write_png(path, width, height, &map.map()))?;
+        }
+        let norms = full.map(|full| relative_norms(&picture.light(), &full));
+        report(&picture, flags, exposure, map.as_ref(), norms, interrupt.pressed())
     })
+}
+
+/// Refuses flags that say nothing of the picture that is asked for.
+fn check(flags: &RenderFlags) -> Result<()> {
+    let is_coherent = flags.sampler == SamplerChoice::CoherenceMap;
+    if !is_coherent && (flags.coherence.supersample.is_some() || flags.coherence.map.is_some()) {
+        bail!(Usage("--supersample and --map are of a coherence map; give --sampler coherence-map".into()));
+    }
+    if is_coherent && flags.interpolation != Interpolation::Constant {
+        bail!(Usage("--interpolation: a coherence map has its own; leave it out".into()));
+    }
+    if flags.compare.is_some() && ImageKind::of(&flags.output) != Some(ImageKind::Exr) {
+        bail!(Usage("--compare is of radiance; let the name of --output end in .exr".into()));
+    }
+    Ok(())
+}
+
+/// A picture of radiance to compare with.
+fn full_picture(path: &Path, (width, height): (u32, u32)) -> Result<Vec<Vec3>> {
+    let (of_width, of_height, pixels) = formats::read_exr(path)?;
+    if (of_width, of_height) != (width, height) {
+        bail!(Usage(format!(
+            "--compare {}: its size is {of_width}x{of_height}, the picture's {width}x{height}; give --size {of_width}x{of_height}",
+            path.display()
+        )));
+    }
+    Ok(pixels)
 }
 
 /// How much is done at most.
@@ -76,13 +121,19 @@ impl Limit {
         let pixels = f64::from(flags.size.0) * f64::from(flags.size.1);
         let samples =
             |a_pixel: f64| Self { samples: (a_pixel * pixels).round().max(1.0) as u64, seconds: f64::INFINITY };
+        let supersample = f64::from(flags.coherence.supersample.unwrap_or(SUPERSAMPLE));
         Ok(match (flags.budget, flags.sampler) {
+            (Some(Budget::Share(share) | Budget::Bare(share)), SamplerChoice::CoherenceMap) => {
+                samples(share * supersample * supersample)
+            }
             (None, SamplerChoice::Full) => samples(FULL),
-            (None, SamplerChoice::Adaptive) => samples(f64::INFINITY),
+            (None, SamplerChoice::Adaptive | SamplerChoice::CoherenceMap) => samples(f64::INFINITY),
             (Some(Budget::RaysPerPixel(a_pixel) | Budget::Share(a_pixel) | Budget::Bare(a_pixel)), _) => {
                 samples(a_pixel)
             }
-            (Some(Budget::Seconds(seconds)), SamplerChoice::Adaptive) => Self { samples: u64::MAX, seconds },
+            (Some(Budget::Seconds(seconds)), SamplerChoice::Adaptive | SamplerChoice::CoherenceMap) => {
+                Self { samples: u64::MAX, seconds }
+            }
             (Some(Budget::Seconds(seconds)), SamplerChoice::Full) => bail!(Usage(format!(
                 "--budget {seconds}s: the full sampler takes as many samples in each pixel, and must know how many; give \
                  rays per pixel, such as 4rpp"
@@ -95,7 +146,8 @@ impl Limit {
 fn begin(flags: &RenderFlags, display: Display, limit: &Limit, evaluate: &Evaluator<'_>) -> Result<Picture> {
     let (width, height) = flags.size;
     let is_exr = ImageKind::of(&flags.output) == Some(ImageKind::Exr);
-    let film = Reconstruction::new(flags.size, flags.filter.into(), flags.interpolation, (!is_exr).then_some(display));
+    let filter = flags.filter.map_or(Filter::Lanczos, Filter::from);
+    let film = Reconstruction::new(flags.size, filter, flags.interpolation, (!is_exr).then_some(display));
     let picture = match flags.sampler {
         SamplerChoice::Adaptive => {
             let options = AdaptiveOptions {
@@ -107,7 +159,7 @@ fn begin(flags: &RenderFlags, display: Display, limit: &Limit, evaluate: &Evalua
             };
             Picture::adaptive(flags.size, &options, film, evaluate)
         }
-        SamplerChoice::Full => {
+        SamplerChoice::Full | SamplerChoice::CoherenceMap => {
             let a_pixel = limit.samples as f64 / (f64::from(width) * f64::from(height));
             Picture::uniform(flags.size, a_pixel, flags.seed, film)
         }
@@ -116,6 +168,28 @@ fn begin(flags: &RenderFlags, display: Display, limit: &Limit, evaluate: &Evalua
         let why = "that many samples cannot be counted; ask for fewer";
         Usage(format!("--size {width}x{height} with --budget: {why}")).into()
     })
+}
+
+/// Begins the picture of a coherence map.
+fn begin_coherent(flags: &RenderFlags, exposure: Exposure, limit: &Limit, lines: &Lines<'_>) -> Result<Picture> {
+    let (width, height) = flags.size;
+    let is_exr = ImageKind::of(&flags.output) == Some(ImageKind::Exr);
+    let supersample = flags.coherence.supersample.unwrap_or(SUPERSAMPLE);
+    let options = CoherenceOptions { supersample, exposure, curve: (!is_exr).then_some(flags.tone_curve) };
+    let map = CoherenceMap::new(width, height, &options, &lines.visible()).ok_or_else(|| {
+        let why = "the work image cannot be that large; ask for fewer pixels";
+        Usage(format!("--size {width}x{height} with --supersample {supersample}: {why}"))
+    })?;
+    if limit.samples < map.least() as u64 {
+        let share = 100.0 * map.least() as f64 / map.pixels() as f64;
+        bail!(Usage(format!(
+            "--budget: {} samples are too few for the corners of the map's first blocks; they need {}, {share:.2} % of the work image",
+            limit.samples,
+            map.least()
+        )));
+    }
+    let filter = flags.filter.map_or(Filter::Gaussian, Filter::from);
+    Ok(Picture::coherent(map, filter, (!is_exr).then_some(Display::new(exposure, flags.tone_curve))))
 }
 
 /// Samples until the limit is reached, nothing is left to do, or Ctrl-C; writes snapshots on the way.
@@ -157,6 +231,7 @@ fn report(
     flags: &RenderFlags,
     exposure: Exposure,
     map: Option<&Output>,
+    norms: Option<[f64; 2]>,
     interrupted: bool,
 ) -> Result<Outcome> {
     let (width, height) = flags.size;
@@ -172,6 +247,7 @@ fn report(
         ));
     }
     let pixels = f64::from(width) * f64::from(height);
+    let seconds = picture.seconds();
     let report = RenderJson {
         width,
         height,
@@ -180,11 +256,14 @@ fn report(
         rays_per_pixel: samples as f64 / pixels,
         all_rays_per_pixel: picture.rays() as f64 / pixels,
         closed_share: picture.closed_share(),
+        evaluated_share: picture.map().map(|map| map.evaluated() as f64 / map.pixels() as f64),
+        l1: norms.map(|[l1, _]| l1),
+        l2: norms.map(|[_, l2]| l2),
         excluded,
         exposure: exposure.ev,
         interrupted,
         histogram: sample_histogram(&counts),
-        seconds: picture.seconds(),
+        seconds: SecondsJson { map: picture.map().map(|_| seconds.generate + seconds.reconstruct), stages: seconds },
     };
     if flags.json {
         print_json(&report)?;
@@ -219,6 +298,14 @@ struct RenderJson {
     all_rays_per_pixel: f64,
     /// Part of the pixels that are known with the confidence asked for; null for the full sampler, which does not ask.
     closed_share: Option<f64>,
+    /// Part of the work image's pixels that are evaluated, of a coherence map.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    evaluated_share: Option<f64>,
+    /// With --compare: norms of the difference, relative to those of the full picture.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    l1: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    l2: Option<f64>,
     /// Samples without a finite radiance.
     excluded: u64,
     /// Exposure value.
@@ -226,16 +313,33 @@ struct RenderJson {
     interrupted: bool,
     /// Pixels with 0, 1, 2 … 20 samples, and with more.
     histogram: Vec<u64>,
-    seconds: Seconds,
+    seconds: SecondsJson,
+}
+
+/// Seconds of the stages.
+#[derive(Serialize)]
+struct SecondsJson {
+    #[serde(flatten)]
+    stages: Seconds,
+    /// All of a coherence map but evaluation.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    map: Option<f64>,
 }
 
 impl RenderJson {
     fn sentence(&self) -> String {
         let known =
             self.closed_share.map_or_else(String::new, |share| format!(", {:.1} % of them known", 100.0 * share));
-        let Seconds { generate, evaluate, reconstruct } = self.seconds;
+        let share = self
+            .evaluated_share
+            .map_or_else(String::new, |share| format!(", {:.1} % of the work image", 100.0 * share));
+        let apart = match (self.l1, self.l2) {
+            (Some(l1), Some(l2)) => format!("; apart from the full picture L1 {l1:.4}, L2 {l2:.4}"),
+            _ => String::new(),
+        };
+        let Seconds { generate, evaluate, reconstruct } = self.seconds.stages;
         format!(
-            "{} samples, {:.2} a pixel{known}; {generate:.2} s to place them, {evaluate:.2} s to look, {reconstruct:.2} s for the \
+            "{} samples, {:.2} a pixel{known}{share}{apart}; {generate:.2} s to place them, {evaluate:.2} s to look, {reconstruct:.2} s for the \
              picture",
             self.samples, self.rays_per_pixel
         )
@@ -245,7 +349,6 @@ impl RenderJson {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use glam::Vec3;
 
     #[test]
     fn background_and_what_is_no_number_do_not_meter() {

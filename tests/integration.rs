@@ -9,6 +9,7 @@ mod architecture;
 mod browser;
 mod cli;
 mod closed_forms;
+mod coherence;
 mod continuity;
 mod desktop;
 mod determinism;

@@ -62,6 +62,29 @@ impl<'a> Eye<'a> {
         self.camera.ray(point, self.size[0], self.size[1])
     }
 
+    /// The point of the image plane, pixels, where a position before the eye is seen.
+    pub(crate) fn project(&self, position: DVec3) -> DVec2 {
+        let (right, up, forward) = self.camera.basis();
+        let way = position - self.camera.eye;
+        let size = self.far_corner();
+        let scale = size.y / (2.0 * (self.camera.vertical_fov / 2.0).tan() * forward.dot(way));
+        0.5 * size + DVec2::new(right.dot(way), -up.dot(way)) * scale
+    }
+
+    /// How far the nearest surface along a ray is.
+    pub(crate) fn nearest(&self, ray: &Ray) -> Option<f64> {
+        self.surfaces.bvh.closest_hit(ray, 0.0).map(|hit| hit.distance)
+    }
+
+    pub(crate) fn camera(&self) -> &Camera {
+        &self.camera
+    }
+
+    /// The lower right corner of the picture, pixels.
+    pub(crate) fn far_corner(&self) -> DVec2 {
+        DVec2::new(self.size[0].into(), self.size[1].into())
+    }
+
     /// What a ray meets.
     pub fn look(&self, ray: &Ray) -> Sight {
         let hit = self.surfaces.bvh.closest_hit(ray, 0.0);
@@ -90,7 +113,7 @@ impl<'a> Eye<'a> {
     }
 
     /// Faces of one object that are smoothed into each other are one; every other polygon is one of its own.
-    fn object(&self, polygon: u32) -> u32 {
+    pub(crate) fn object(&self, polygon: u32) -> u32 {
         let scene = self.scene();
         match scene.has_shading_normals(polygon) {
             true => 1 + scene.polygons.len() as u32 + scene.polygons[polygon as usize].object,

@@ -42,16 +42,17 @@ pub struct RenderFlags {
     /// The sky, where it is what lights the scene
     #[command(flatten)]
     pub sky: SkyFlags,
-    /// How much is done: samples a pixel (1.9rpp, or a bare number), seconds (30s), or samples as a share of the pixels (6%)
-    /// [default: until every pixel is known; with --sampler full 4 samples a pixel]
+    /// How much is done: samples a pixel (1.9rpp, or a bare number), seconds (30s), or samples as a share of the pixels (6%); with
+    /// --sampler coherence-map of those of the work image, and a bare number is a share, too [default: until every pixel is known; with
+    /// --sampler full 4 samples a pixel]
     #[arg(long, value_name = "N|Nrpp|Ns|N%", value_parser = budget, allow_hyphen_values = true)]
     pub budget: Option<Budget>,
     /// When a pixel is known
     #[command(flatten)]
     pub confidence: ConfidenceFlags,
-    /// The filter that the picture is seen through
-    #[arg(long, value_enum, default_value_t)]
-    pub filter: FilterChoice,
+    /// The filter that the picture is seen through [default: lanczos; with --sampler coherence-map gaussian]
+    #[arg(long, value_enum)]
+    pub filter: Option<FilterChoice>,
     /// The surface through the samples that is filtered
     #[arg(long, value_enum, default_value_t)]
     pub interpolation: Interpolation,
@@ -61,6 +62,12 @@ pub struct RenderFlags {
     /// Where a map of the samples goes: from black, none in a pixel, to white, twenty; red above
     #[arg(long, value_name = "FILE.png", value_parser = png_path)]
     pub sample_map: Option<PathBuf>,
+    /// The coherence map
+    #[command(flatten)]
+    pub coherence: CoherenceFlags,
+    /// Full picture (.exr) that this one is compared with: the L1 and L2 norms of the difference, relative to its own
+    #[arg(long, value_name = "FULL.exr")]
+    pub compare: Option<PathBuf>,
     /// Seed of all that is left to chance; the same seed gives the same picture
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub seed: u64,
@@ -82,6 +89,17 @@ pub struct RadianceFlags {
     /// a .hlf file was baked]
     #[arg(long, value_name = "N", allow_negative_numbers = true)]
     pub bounces: Option<u32>,
+}
+
+/// What is asked of a coherence map.
+#[derive(Debug, Args)]
+pub struct CoherenceFlags {
+    /// Pixels of the work image along a side of each of the picture's, with --sampler coherence-map [default: 3]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=16), allow_negative_numbers = true)]
+    pub supersample: Option<u32>,
+    /// Where the map goes, with --sampler coherence-map: evaluated pixels white, blocks in the colour of their direction
+    #[arg(long, value_name = "FILE.png", value_parser = png_path)]
+    pub map: Option<PathBuf>,
 }
 
 /// When the adaptive sampler takes a pixel for known: when its mean is within an interval with a probability.
@@ -116,6 +134,8 @@ pub enum SamplerChoice {
     /// Where the picture is not known yet.
     #[default]
     Adaptive,
+    /// On the borders of blocks that edges cross: a directional coherence map.
+    CoherenceMap,
 }
 
 /// Where radiance comes from.
