@@ -1,8 +1,8 @@
-//! Adaptive pictures: the tables of Painter & Sloan 1989 again, how many pixels are as near to the truth as they claim, and the same
-//! rays spread evenly.
+//! Adaptive pictures: the tables of Painter & Sloan 1989 again, how many pixels are as near to the truth as they claim, and the
+//! same rays spread evenly.
 //!
-//! `cargo bench --bench adaptive` prints a page for data/record/; `-- tables`, `-- uniform` and `-- speed` one part of it. The teapot
-//! is not in this repository: `HALFLIGHT_TEAPOT=FILE.obj` says where it is, without it its rows are left out.
+//! `cargo bench --bench adaptive` prints a page for data/record/; `-- tables`, `-- uniform` and `-- speed` one part of it. The
+//! teapot is not in this repository: `HALFLIGHT_TEAPOT=FILE.obj` says where it is, without it its rows are left out.
 
 #![allow(clippy::print_stdout, clippy::print_stderr, clippy::unwrap_used)]
 

@@ -1,7 +1,7 @@
 //! Directional coherence maps: the table of Guo 1998 again, beside adaptive sampling with as many samples.
 //!
-//! `cargo bench --workspace --bench coherence` prints a page for data/record/: direct light, exact at every pixel. `-- bounces` gathers all
-//! light, in pictures of half the side, for half an hour of processor time.
+//! `cargo bench --workspace --bench coherence` prints a page for data/record/: direct light, exact at every pixel. `-- bounces`
+//! gathers all light, in pictures of half the side, for half an hour of processor time.
 
 #![allow(clippy::print_stdout, clippy::unwrap_used)]
 

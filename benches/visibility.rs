@@ -1,7 +1,7 @@
 //! Coherent visibility: the tables of Ben-Artzi, Ramamoorthi and Agrawala 2004 again, with what is predicted wrong.
 //!
-//! `cargo bench --bench visibility` prints a page for data/record/; `-- 200` makes it of that many lights alone. The detailed mesh is not in this
-//! repository: `HALFLIGHT_MESH=FILE.obj` says where it is, without it its rows are left out.
+//! `cargo bench --bench visibility` prints a page for data/record/; `-- 200` makes it of that many lights alone. The detailed
+//! mesh is not in this repository: `HALFLIGHT_MESH=FILE.obj` says where it is, without it its rows are left out.
 
 #![allow(clippy::print_stdout, clippy::print_stderr, clippy::unwrap_used)]
 

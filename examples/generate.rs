@@ -1,7 +1,7 @@
 //! Writes a generated scene: `cargo run --release --example generate -- hall 24000 OUT.obj`, or `-- rooms 8 OUT.obj`.
 //!
-//! The number is that of polygons of the hall, of rooms, of faces around a round shape, of dominoes or of leaves. An MTL file of the same name is
-//! written beside it.
+//! The number is that of polygons of the hall, of rooms, of faces around a round shape, of dominoes or of leaves. An MTL file
+//! of the same name is written beside it.
 
 #[path = "../benches/common/generated/mod.rs"]
 mod generated;

@@ -131,8 +131,8 @@ pub struct LimitFlags {
     /// Seconds after which no further round of refinement begins
     #[arg(long, value_name = "S", value_parser = positive, allow_hyphen_values = true)]
     pub max_seconds: Option<f64>,
-    /// Memory that the bake may hold, such as 2GB or 500MB; a scene that needs more at least is refused [default: a scene is refused
-    /// that needs more at least than the machine has to give]
+    /// Memory that the bake may hold, such as 2GB or 500MB; a scene that needs more at least is refused [default: a scene is
+    /// refused that needs more at least than the machine has to give]
     #[arg(long, value_name = "SIZE", value_parser = size_in_bytes)]
     pub max_memory: Option<u64>,
 }

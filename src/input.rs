@@ -88,8 +88,8 @@ pub fn require_light(path: &Path, scene: &Scene) -> Result<()> {
     Ok(())
 }
 
-/// The scene's bake, from the cache where it is there, else made before an onlooker. A cache that cannot be used costs time, nothing
-/// else.
+/// The scene's bake, from the cache where it is there, else made before an onlooker. A cache that cannot be used costs time,
+/// nothing else.
 pub fn bake_once(scene: &Scene, flags: &LightFlags, outputs: &Outputs, onlooker: Option<Onlooker<'_>>) -> Baked {
     let place = match place(scene, flags) {
         Ok(place) => place,

@@ -30,8 +30,8 @@ impl<'a> PointGather<'a> {
         Self { gather, solution, middles, prepared }
     }
 
-    /// Irradiance at a point of a polygon, by its shading normal if any, W·m⁻². On a contact line the side towards the middle of the
-    /// polygon counts.
+    /// Irradiance at a point of a polygon, by its shading normal if any, W·m⁻². On a contact line the side towards the middle
+    /// of the polygon counts.
     pub fn irradiance(&self, point: &SurfacePoint) -> Rgb {
         let Some(leaf) = self.leaf_under(point) else { return Rgb::ZERO };
         let inward = self.middles[point.polygon as usize] - point.position;

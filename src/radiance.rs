@@ -19,8 +19,8 @@ use crate::point_gather::PointGather;
 use crate::probe::as_baked;
 use crate::shot::camera;
 
-/// Paths for one sample where nothing else is said: about as many as take the time of the rest of a sample's work ten times, so that
-/// this is not what is waited for.
+/// Paths for one sample where nothing else is said: about as many as take the time of the rest of a sample's work ten times, so
+/// that this is not what is waited for.
 const PATHS: u32 = 16;
 
 /// How far a point of a surface may lie from the triangle of the mesh that stands for it, as a fraction of the scene's size: the

@@ -1,5 +1,5 @@
-//! Pictures of directional coherence maps: near the full one from few pixels, equal to it from all, and whatever is asked, a picture
-//! or a clear word.
+//! Pictures of directional coherence maps: near the full one from few pixels, equal to it from all, and whatever is asked, a
+//! picture or a clear word.
 
 use std::path::Path;
 

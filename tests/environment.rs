@@ -87,7 +87,8 @@ fn odd_maps_are_told_of() {
     }
 }
 
-/// A box that reflects half of a sky of 1 sends 0.5 on every side, to 0.1 %. (Of a white one the importer makes a reflectance of 0.999.)
+/// A box that reflects half of a sky of 1 sends 0.5 on every side, to 0.1 %. (Of a white one the importer makes a reflectance
+/// of 0.999.)
 #[test]
 fn a_white_furnace_is_white() {
     let folder = folder();

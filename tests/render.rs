@@ -1,5 +1,5 @@
-//! Pictures from samples: what the samplers are handed agrees with each other, adaptive ones are nearer to the truth than even ones,
-//! and whatever is asked, a picture or a clear word comes of it.
+//! Pictures from samples: what the samplers are handed agrees with each other, adaptive ones are nearer to the truth than even
+//! ones, and whatever is asked, a picture or a clear word comes of it.
 
 use std::path::{Path, PathBuf};
 
@@ -103,8 +103,8 @@ fn a_picture_is_the_one_that_shot_draws() {
     assert!(count * 10 > ours.len() * 8, "{count} of {} pixels", ours.len());
 }
 
-/// The RMSE of the light that is shown against many samples a pixel: nowhere more than that of as many even samples, and at most half of it once
-/// there is a sample a pixel.
+/// The RMSE of the light that is shown against many samples a pixel: nowhere more than that of as many even samples, and at
+/// most half of it once there is a sample a pixel.
 #[test]
 fn adaptive_pictures_are_nearer_than_even_ones() {
     let folder = folder();

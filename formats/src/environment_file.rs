@@ -14,7 +14,8 @@ use crate::FormatError;
 pub struct EnvironmentMap {
     /// The map; radiance as the file has it.
     pub map: LatLongMap,
-    /// Texels with a channel that was not a number or negative, and is 0 now, or infinite, and is now the largest finite one of the file.
+    /// Texels with a channel that was not a number or negative, and is 0 now, or infinite, and is now the largest finite one of
+    /// the file.
     pub clamped: u64,
     /// In words, what to tell the user.
     pub warnings: Vec<String>,

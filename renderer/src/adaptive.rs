@@ -1,15 +1,15 @@
 //! Adaptive progressive refinement in the image plane (J. Painter and K. Sloan, "Antialiased Ray Tracing by Adaptive Progressive
 //! Refinement", SIGGRAPH 1989, section 3.1): where the next samples go, and when there are enough.
 //!
-//! One k-D tree covers the whole image plane. Above the pixel level the cell is parted whose area times external variance is largest: so
-//! everything is looked at, borders first. Within a pixel that cell is parted which adds most to the variance of the pixel's
-//! mean, and the pixel is closed off once that mean is known with the confidence asked for. A cell's sample stays in its half when the
-//! cell is parted, and a new one is drawn from the other half: a hierarchy of jittered samples.
+//! One k-D tree covers the whole image plane. Above the pixel level the cell is parted whose area times external variance is
+//! largest: so everything is looked at, borders first. Within a pixel that cell is parted which adds most to the variance of
+//! the pixel's mean, and the pixel is closed off once that mean is known with the confidence asked for. A cell's sample stays
+//! in its half when the cell is parted, and a new one is drawn from the other half: a hierarchy of jittered samples.
 //!
 //! What we do differently:
-//! - Samples come in batches: not one walk after another from the root to the largest priority, but one walk over all that is not
-//!   closed, and of what it finds the largest priorities at once. A batch can be evaluated in parallel, and what is in it depends on
-//!   nothing but the seed.
+//! - Samples come in batches: not one walk after another from the root to the largest priority, but one walk over all that is
+//!   not closed, and of what it finds the largest priorities at once. A batch can be evaluated in parallel, and what is in it
+//!   depends on nothing but the seed.
 //! - A pixel with several samples has the variance of its mean for a priority. By the external one, which its own samples do
 //!   not lessen, every border would be finished before anything else is begun.
 //! - A pixel that is known well enough waits until the cells around it are pixels, too, before it is closed.
@@ -39,9 +39,9 @@ const GROWTH: usize = 2;
 const URGENT: usize = 3;
 const WORTHY: f32 = 0.3;
 
-/// External variance that the most even cell is taken to have: something that no sample met may be in it. Without it, borders that
-/// are known of are all refined before a lamp that is not, and an unfinished picture may be worse than one of even samples; ten times
-/// as much leaves borders a fifth more error.
+/// External variance that the most even cell is taken to have: something that no sample met may be in it. Without it, borders
+/// that are known of are all refined before a lamp that is not, and an unfinished picture may be worse than one of even
+/// samples; ten times as much leaves borders a fifth more error.
 const EVEN: f32 = 1e-4;
 
 /// Area, pixels, of the cells that are walked over at once. Less is more to put together, more keeps fewer threads busy.
@@ -138,8 +138,8 @@ impl AdaptiveSampler {
         self.batch.iter().map(|parting| pixels(parting.place)).collect()
     }
 
-    /// Takes what is seen at the points of the last batch, or at the first of them. What changed: the cells with another radiance than
-    /// before.
+    /// Takes what is seen at the points of the last batch, or at the first of them. What changed: the cells with another
+    /// radiance than before.
     ///
     /// Radiance that is no finite number is excluded: the cell keeps what it had before.
     pub fn take(&mut self, seen: &[Evaluation]) -> Vec<Tile> {

@@ -1,4 +1,5 @@
-//! Blocks of a work image (Guo 1998, sections 2 and 4): rectangles that share the pixels of their boundaries, parted like a quadtree.
+//! Blocks of a work image (Guo 1998, sections 2 and 4): rectangles that share the pixels of their boundaries, parted like a
+//! quadtree.
 
 /// Longest side of an elementary block, steps between pixels (Guo's 8 × 8).
 pub(crate) const ELEMENTARY: u32 = 8;
@@ -55,8 +56,8 @@ impl Block {
         }
     }
 
-    /// Its parts in order, four, or two if it is much longer than wide; of a block of pixels none. It is parted at the largest power
-    /// of two within its longer side: so blocks are squares but for those at the end of a row or column.
+    /// Its parts in order, four, or two if it is much longer than wide; of a block of pixels none. It is parted at the largest
+    /// power of two within its longer side: so blocks are squares but for those at the end of a row or column.
     pub fn parts(&self) -> impl Iterator<Item = Self> + use<> {
         let [width, height] = self.sides();
         let step = width.max(height).div_ceil(2).next_power_of_two();

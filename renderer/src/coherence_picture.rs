@@ -1,5 +1,5 @@
-//! Pictures of a coherence map, at any time (Guo 1998, sections 2 and 5): of the work image no more than strips are made, and what is
-//! evaluated is never overwritten.
+//! Pictures of a coherence map, at any time (Guo 1998, sections 2 and 5): of the work image no more than strips are made, and
+//! what is evaluated is never overwritten.
 
 use std::ops::Range;
 
@@ -17,8 +17,8 @@ use crate::reduction::Reduction;
 const BAND: u32 = 32;
 
 impl CoherenceMap {
-    /// The picture so far, row by row: radiance, W·sr⁻¹·m⁻², or what a display shows, through a filter. Of the work image no more than
-    /// strips are made.
+    /// The picture so far, row by row: radiance, W·sr⁻¹·m⁻², or what a display shows, through a filter. Of the work image no
+    /// more than strips are made.
     pub fn picture(&self, filter: Filter, display: Option<Display>) -> Vec<Vec3> {
         let [width, height] = self.image.size();
         let reduction = Reduction::new(filter, self.options.supersample);
@@ -73,7 +73,8 @@ impl CoherenceMap {
         strips
     }
 
-    /// Columns and rows of the pixels that are a block's own: those on its right and lower side are its neighbours', if there are any.
+    /// Columns and rows of the pixels that are a block's own: those on its right and lower side are its neighbours', if there
+    /// are any.
     fn own(&self, block: &Block) -> [Range<u32>; 2] {
         let size = self.image.size();
         [0, 1].map(|axis| {

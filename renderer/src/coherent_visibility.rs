@@ -1,11 +1,12 @@
-//! Which lights are seen from which pixel, from a few of all shadow rays: Ben-Artzi, Ramamoorthi and Agrawala, "Efficient Shadows from
-//! Sampled Environment Maps", Columbia University CUCS-025-04, 2004.
+//! Which lights are seen from which pixel, from a few of all shadow rays: Ben-Artzi, Ramamoorthi and Agrawala, "Efficient
+//! Shadows from Sampled Environment Maps", Columbia University CUCS-025-04, 2004.
 //!
-//! A pixel is predicted from others that are known, and rays are traced where the prediction is doubtful; what they find wrong is doubted
-//! further, from light to neighbouring light. All of the paper's variants are here, so that they can be compared.
+//! A pixel is predicted from others that are known, and rays are traced where the prediction is doubtful; what they find wrong
+//! is doubted further, from light to neighbouring light. All of the paper's variants are here, so that they can be compared.
 //!
-//! What we do differently: a light below the horizon of a known pixel is not known there, and the others are asked; the paper does not say. On
-//! round bodies that spares the rays along the terminator. A light that no known pixel has above its horizon is traced.
+//! What we do differently: a light below the horizon of a known pixel is not known there, and the others are asked; the paper
+//! does not say. On round bodies that spares the rays along the terminator. A light that no known pixel has above its horizon
+//! is traced.
 
 use std::collections::VecDeque;
 
@@ -39,11 +40,11 @@ pub struct Coherence {
     pub floods_finest: bool,
     /// What is done at the borders of objects.
     pub borders: Borders,
-    /// How many of the lights that are brightest on a pixel are doubted at boundaries, whatever the flooding: section 5 of the paper. Bright lights
-    /// have small cells, and are what is seen of an error.
+    /// How many of the lights that are brightest on a pixel are doubted at boundaries, whatever the flooding: section 5 of the
+    /// paper. Bright lights have small cells, and are what is seen of an error.
     pub brightest: u32,
-    /// The part of the light of an unobstructed pixel, 0..1, that may be guessed: of the lights that known pixels disagree on the faintest are not
-    /// traced, as long as all of them together send no more.
+    /// The part of the light of an unobstructed pixel, 0..1, that may be guessed: of the lights that known pixels disagree on
+    /// the faintest are not traced, as long as all of them together send no more.
     pub error: f64,
 }
 
@@ -52,8 +53,8 @@ pub struct Coherence {
 pub enum Borders {
     /// A ray to every light, as the paper has it.
     Traced,
-    /// It is predicted from those that are, if there are two or more, and boundaries of what is seen are doubted, and what is found wrong flooded, whatever is done
-    /// elsewhere.
+    /// It is predicted from those that are, if there are two or more, and boundaries of what is seen are doubted, and what is
+    /// found wrong flooded, whatever is done elsewhere.
     Predicted,
 }
 
@@ -78,8 +79,8 @@ pub enum Flooding {
 }
 
 impl Visibility {
-    /// The variants by the paper's names: S scanline or G grid, W warping or N none, B boundary or U uncertainty, and OPT; each of OPT's
-    /// two restrictions alone; and full tracing.
+    /// The variants by the paper's names: S scanline or G grid, W warping or N none, B boundary or U uncertainty, and OPT; each
+    /// of OPT's two restrictions alone; and full tracing.
     pub const NAMED: [(&'static str, Self); 14] = [
         ("full", Self::Full),
         ("swb", coherent(EvaluationOrder::Scanline, true, Flooding::Boundary, true)),
@@ -108,8 +109,8 @@ const fn predicting_borders(flooding: Flooding, floods_finest: bool) -> Visibili
     Visibility::Coherent(Coherence { order, warps: false, flooding, floods_finest, borders, brightest: 0, error: 0.0 })
 }
 
-/// Pixels of its own object that one at a border is predicted from at least: from a single one hardly fewer rays are traced in all, and on a
-/// plant a quarter more is predicted wrong.
+/// Pixels of its own object that one at a border is predicted from at least: from a single one hardly fewer rays are traced in
+/// all, and on a plant a quarter more is predicted wrong.
 const FEWEST_AT_BORDERS: usize = 2;
 
 /// A pixel that light is asked for at.
@@ -204,7 +205,8 @@ struct Search<'a> {
     luminances: Vec<f64>,
     places: &'a [Option<Place>],
     known: BlockVisibility,
-    /// By pixel and light, a point of what hides it, relative to the pixel, metres; not a number where nothing does. Empty without warping.
+    /// By pixel and light, a point of what hides it, relative to the pixel, metres; not a number where nothing does. Empty
+    /// without warping.
     blockers: Vec<Vec3>,
     words: usize,
     /// Of the pixel at hand: lights above its horizon, those that nothing is predicted of, and those that are traced or will be.
@@ -371,7 +373,8 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Doubts what is uncertain, and boundaries where seen and hidden meet: all with boundary flooding, else those of the brightest lights.
+    /// Doubts what is uncertain, and boundaries where seen and hidden meet: all with boundary flooding, else those of the
+    /// brightest lights.
     fn doubt(&mut self, step: &Step, receiver: &Receiver, coherence: Coherence) {
         self.doubted.fill(0);
         let ranks = coherence.error > 0.0 || coherence.brightest > 0;

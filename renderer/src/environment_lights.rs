@@ -31,8 +31,8 @@ pub struct EnvironmentLights {
 }
 
 impl EnvironmentLights {
-    /// At most `count` lights, fewer if the sky has not as many pieces that are lit; the sun of a sky by the standard is one of them. None if
-    /// `count` is 0 or the environment is black.
+    /// At most `count` lights, fewer if the sky has not as many pieces that are lit; the sun of a sky by the standard is one of
+    /// them. None if `count` is 0 or the environment is black.
     pub fn new(environment: &Environment, count: u32, sampling: SkySampling) -> Option<Self> {
         let sky = SkyPieces::of(environment);
         let sun = environment.sun();
@@ -91,8 +91,8 @@ impl EnvironmentLights {
     }
 }
 
-/// Lights about some places: each in the mean direction of the light that is nearest to its place, and as strong. So all of a cell that is
-/// above a surface's horizon is exact on it, whatever its normal.
+/// Lights about some places: each in the mean direction of the light that is nearest to its place, and as strong. So all of a
+/// cell that is above a surface's horizon is exact on it, whatever its normal.
 fn lights_at(sky: &SkyPieces, places: &[DVec3]) -> (Vec<DVec3>, Vec<Rgb>) {
     let mut flows = vec![[DVec3::ZERO; 3]; places.len()];
     for (piece, cell) in sky.pieces.iter().zip(nearest_directions(&sky.pieces, places)) {

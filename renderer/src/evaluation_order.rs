@@ -1,6 +1,7 @@
 //! The order in which the pixels of a block are looked at, and which of those that are known each is predicted from.
 
-/// Pixels between those of the coarsest grid, the paper's: at twice that a third fewer are looked at in full, and more is predicted wrong.
+/// Pixels between those of the coarsest grid, the paper's: at twice that a third fewer are looked at in full, and more is
+/// predicted wrong.
 const COARSEST: usize = 16;
 
 /// One pixel of a block; pixels are counted row by row.
@@ -36,9 +37,9 @@ pub(crate) fn scanlines(width: usize, height: usize, from_three: bool) -> Vec<St
     (0..width * height).map(step).collect()
 }
 
-/// From a coarse grid to all pixels: the middles of cells from their corners, then those of edges from their ends and the middles on
-/// both sides. Cells need not be square, so that a block of any size has its last row and column in the coarsest grid; on the border
-/// of a block an edge has one side.
+/// From a coarse grid to all pixels: the middles of cells from their corners, then those of edges from their ends and the
+/// middles on both sides. Cells need not be square, so that a block of any size has its last row and column in the coarsest
+/// grid; on the border of a block an edge has one side.
 pub(crate) fn grid(width: usize, height: usize) -> Vec<Step> {
     let (mut columns, mut rows) = (coarsest(width), coarsest(height));
     let mut steps: Vec<Step> =

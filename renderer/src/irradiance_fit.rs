@@ -1,8 +1,9 @@
-//! Lights are made to send what the sky sends: their strengths are fitted to the irradiance of unobstructed surfaces of all normals.
+//! Lights are made to send what the sky sends: their strengths are fitted to the irradiance of unobstructed surfaces of all
+//! normals.
 //!
-//! A light at the mean direction of its cell's light is exact for every surface that has all of the cell above its horizon. Of a cell that a
-//! horizon cuts it sends too little on average, since a cosine that is cut off at 0 is convex: with 200 lights in a uniform sky 0.5 % of all.
-//! Strengths that differ by a few per cent mend that.
+//! A light at the mean direction of its cell's light is exact for every surface that has all of the cell above its horizon. Of
+//! a cell that a horizon cuts it sends too little on average, since a cosine that is cut off at 0 is convex: with 200 lights in
+//! a uniform sky 0.5 % of all. Strengths that differ by a few per cent mend that.
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -14,8 +15,8 @@ use crate::sky_pieces::Piece;
 const NORMALS: u32 = 1024;
 const NORMALS_A_LIGHT: u32 = 3;
 
-/// What a relative change of a light counts beside an error of irradiance, in squares of the mean light's own irradiance. Less fits better,
-/// and lets single lights stray from the light of their cells, which shows where only some of them are seen.
+/// What a relative change of a light counts beside an error of irradiance, in squares of the mean light's own irradiance. Less
+/// fits better, and lets single lights stray from the light of their cells, which shows where only some of them are seen.
 const STIFFNESS: f64 = 1e-4;
 
 /// Steps of conjugate gradients: the error no longer changes in its third digit.

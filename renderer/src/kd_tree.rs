@@ -1,11 +1,12 @@
 //! The k-D tree of samples (Painter & Sloan 1989, section 3.1.1).
 //!
-//! Every leaf is a cell of the image plane with one sample in it; every node above has the mean over its cell. What the paper stores
-//! beside the mean is found where it is asked for, by walks down the tree ([`Visit`]) that take the cells beside them along: from
-//! these comes the external variance, and below the pixel level the variance of a mean and the number of samples. So a node
-//! needs 28 bytes and a sample 36.
+//! Every leaf is a cell of the image plane with one sample in it; every node above has the mean over its cell. What the paper
+//! stores beside the mean is found where it is asked for, by walks down the tree ([`Visit`]) that take the cells beside them
+//! along: from these comes the external variance, and below the pixel level the variance of a mean and the number of samples.
+//! So a node needs 28 bytes and a sample 36.
 //!
-//! Means are of what a display shows ([`Display`]), as the paper's are: a lamp's edge is no harder to know for being brighter than white.
+//! Means are of what a display shows ([`Display`]), as the paper's are: a lamp's edge is no harder to know for being brighter
+//! than white.
 
 use glam::{Vec3, Vec3A};
 use scene::Display;

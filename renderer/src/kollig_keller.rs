@@ -1,8 +1,10 @@
-//! Where lights stand in a sky, after Kollig and Keller, "Efficient Illumination by High Dynamic Range Images", EGSR 2003: the cell
-//! with the most light is split until there are as many as asked for, and cells are relaxed (Lloyd 1982) to the middle of their light.
+//! Where lights stand in a sky, after Kollig and Keller, "Efficient Illumination by High Dynamic Range Images", EGSR 2003: the
+//! cell with the most light is split until there are as many as asked for, and cells are relaxed (Lloyd 1982) to the middle of
+//! their light.
 //!
-//! What we do differently: a cell is split across the axis along which its light is spread widest, at the mean, where the paper adds a point and
-//! relaxes after each; relaxation is left to the end, which costs a few looks at all pieces instead of one a light.
+//! What we do differently: a cell is split across the axis along which its light is spread widest, at the mean, where the paper
+//! adds a point and relaxes after each; relaxation is left to the end, which costs a few looks at all pieces instead of one a
+//! light.
 
 use glam::{DMat3, DVec3};
 use scene::luminance;

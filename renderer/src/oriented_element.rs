@@ -1,7 +1,8 @@
 //! Oriented finite elements (Guo 1998, section 3): a block's light from that on its boundary, along one direction.
 //!
-//! Between two scanlines of a direction, through neighbouring pixels of the boundary, light is bilinear: linear along the boundary, and linear
-//! along each scanline. So a pixel's light is that of the two ends of its own scanline, in the measure of their distances.
+//! Between two scanlines of a direction, through neighbouring pixels of the boundary, light is bilinear: linear along the
+//! boundary, and linear along each scanline. So a pixel's light is that of the two ends of its own scanline, in the measure of
+//! their distances.
 //!
 //! What we do differently: the discrepancy of a direction is the integral over the width that its scanlines fill, not over the
 //! boundary's length. A side that a scanline runs along then has no part in it, where the paper's would compare its two ends.
@@ -57,8 +58,8 @@ impl Boundary {
         (ahead * to + behind * from) / (from + to).max(f32::MIN_POSITIVE)
     }
 
-    /// The light at a pixel inside where nothing is known of a direction: what the four sides say, blended (Coons), which is bilinear
-    /// between corners if no more is evaluated.
+    /// The light at a pixel inside where nothing is known of a direction: what the four sides say, blended (Coons), which is
+    /// bilinear between corners if no more is evaluated.
     pub fn blended(&self, place: Vec2) -> Vec3 {
         let (x, y) = (place.x as usize, place.y as usize);
         let (width, height) = (self.sides.x as usize, self.sides.y as usize);

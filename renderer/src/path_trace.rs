@@ -158,7 +158,8 @@ impl<'a> PathTracer<'a> {
         Estimate { mean, variance: squares / f64::from(BATCHES * (BATCHES - 1)) }
     }
 
-    /// The mean of some samples that are spread evenly among themselves. Of the emitters seen, the first are those from the receiver.
+    /// The mean of some samples that are spread evenly among themselves. Of the emitters seen, the first are those from the
+    /// receiver.
     fn batch(
         &self,
         receiver: &Receiver,

@@ -2,8 +2,8 @@
 //! Sets", IEEE CG&A 1987).
 //!
 //! Each triangle is cut into six around a point within, from which lines go to its corners and to a point on each edge: that
-//! where the line to the neighbour's inner point crosses. Over each of the six is a quadratic (Powell and Sabin 1977). With values and
-//! slopes at the corners all of them are determined, and neighbours meet without a fold.
+//! where the line to the neighbour's inner point crosses. Over each of the six is a quadratic (Powell and Sabin 1977). With
+//! values and slopes at the corners all of them are determined, and neighbours meet without a fold.
 
 use glam::{DVec2, DVec3};
 

@@ -1,7 +1,7 @@
 //! Means over the cells of a fine grid of what is given over triangles, and what a filter makes of them.
 //!
-//! The integral of a filter over a triangle has no simple form, that over a rectangle has. So triangles are cut along the lines of a
-//! grid, where what is a polynomial on each is integrated exactly; within a cell the filter sees the mean.
+//! The integral of a filter over a triangle has no simple form, that over a rectangle has. So triangles are cut along the lines
+//! of a grid, where what is a polynomial on each is integrated exactly; within a cell the filter sees the mean.
 
 use std::ops::Range;
 
@@ -10,8 +10,9 @@ use rayon::prelude::*;
 
 use crate::filter::SummedFilter;
 
-/// Cells along a side of a pixel: the more, the more pieces triangles are cut into. At four a filter takes the light on one side of a
-/// border for a 32nd of a pixel away from where it is at most; the box, whose border is one of the cells', for where it is.
+/// Cells along a side of a pixel: the more, the more pieces triangles are cut into. At four a filter takes the light on one
+/// side of a border for a 32nd of a pixel away from where it is at most; the box, whose border is one of the cells', for where
+/// it is.
 const FINE: usize = 4;
 
 /// Rows of cells that one thread adds to at a time.

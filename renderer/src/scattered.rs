@@ -1,8 +1,8 @@
 //! Reconstruction from samples as scattered points (Painter & Sloan 1989, section 3.3.2): a surface over their Delaunay
 //! triangulation, and what a filter makes of it.
 //!
-//! The triangulation grows with the samples. What we do differently: triangles that come and go are not added and subtracted, as the
-//! library that keeps them does not tell; all are integrated when a picture is asked for.
+//! The triangulation grows with the samples. What we do differently: triangles that come and go are not added and subtracted,
+//! as the library that keeps them does not tell; all are integrated when a picture is asked for.
 
 use glam::{DVec2, DVec3, Vec3};
 use scene::Display;
@@ -41,8 +41,8 @@ impl ScatteredFilm {
         self.samples.insert(point, light);
     }
 
-    /// The picture of the samples so far, row by row: radiance, W·sr⁻¹·m⁻², or what a display shows, above 0. Beyond the samples light
-    /// is as it is at their border; fewer than three are black.
+    /// The picture of the samples so far, row by row: radiance, W·sr⁻¹·m⁻², or what a display shows, above 0. Beyond the
+    /// samples light is as it is at their border; fewer than three are black.
     pub fn picture(&self, surface: Surface) -> Vec<Vec3> {
         let mesh = self.samples.mesh();
         match surface {

@@ -22,8 +22,9 @@ impl Stream {
     }
 }
 
-/// A number of 64 random bits for each of many numbers, other ones for each seed: two rounds of the finalizer of SplitMix64 (Steele,
-/// Lea and Flood 2014). For places that are drawn in any order, where a stream each would cost more than what it draws.
+/// A number of 64 random bits for each of many numbers, other ones for each seed: two rounds of the finalizer of SplitMix64
+/// (Steele, Lea and Flood 2014). For places that are drawn in any order, where a stream each would cost more than what it
+/// draws.
 pub(crate) fn scatter(seed: u64, number: u64) -> u64 {
     let mix = |word: u64| {
         let word = (word ^ word >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);

@@ -1,7 +1,7 @@
 //! Whether a block is crossed by one edge at most, as far as its boundary tells (Guo 1998, section 4.3).
 //!
-//! What we do differently: a boundary with less contrast than the classification asks for is even, and passes the tests of luminance; the
-//! paper's threshold half-way would part its noise.
+//! What we do differently: a boundary with less contrast than the classification asks for is even, and passes the tests of
+//! luminance; the paper's threshold half-way would part its noise.
 
 use glam::Vec2;
 
@@ -31,8 +31,8 @@ const REACH: i32 = 3;
 /// Least side of a block with an inner layer of its own, steps.
 const LEAST_SIDE: u32 = 4;
 
-/// Tests an elementary block whose boundary is known. `values` are its luminance as shown and objects, clockwise, and `is_even` whether its
-/// contrast is less than an edge's.
+/// Tests an elementary block whose boundary is known. `values` are its luminance as shown and objects, clockwise, and `is_even`
+/// whether its contrast is less than an edge's.
 pub(crate) fn simplicity(block: &Block, values: &[(f32, u32)], is_even: bool, look: &Look<'_>) -> Simplicity {
     if !passes_object_test(values) {
         return Simplicity::Complex;
@@ -60,7 +60,8 @@ fn passes_object_test(values: &[(f32, u32)]) -> bool {
     (0..count).filter(|&i| values[i].1 != values[(i + 1) % count].1).count() <= 2
 }
 
-/// The threshold half-way, and which pixels exceed it: of values smoothed over three (Bartlett), without spans of one pixel (median).
+/// The threshold half-way, and which pixels exceed it: of values smoothed over three (Bartlett), without spans of one pixel
+/// (median).
 fn pattern(values: &[(f32, u32)]) -> (f32, [bool; MOST_ON_BOUNDARY]) {
     let count = values.len();
     let at = |i: usize| values[i % count].0;

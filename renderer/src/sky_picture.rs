@@ -1,8 +1,8 @@
 //! Pictures of scenes under a sky: direct light of many lights that are far away, reflected diffusely.
 //!
-//! A picture is made in blocks of 64 × 64 pixels that know nothing of each other, so that what is kept of visibility fits in a cache: one bit a
-//! light and pixel. A block looks at the first row and column of the next ones too, which costs 3 % of the pixels twice and no more rays than
-//! others; the paper traces them in full.
+//! A picture is made in blocks of 64 × 64 pixels that know nothing of each other, so that what is kept of visibility fits in a
+//! cache: one bit a light and pixel. A block looks at the first row and column of the next ones too, which costs 3 % of the
+//! pixels twice and no more rays than others; the paper traces them in full.
 
 use std::f64::consts::PI;
 use std::time::Instant;
@@ -26,8 +26,8 @@ pub struct SkyPicture {
     pub radiance: Vec<Vec3>,
     /// Shadow rays traced, by pixel.
     pub traced: Vec<u32>,
-    /// The words of a set of lights for each pixel, row by row: bit i of word j is set where light 64·j + i is seen. Empty if they were not
-    /// asked for.
+    /// The words of a set of lights for each pixel, row by row: bit i of word j is set where light 64·j + i is seen. Empty if
+    /// they were not asked for.
     pub seen: Vec<u64>,
     /// Pairs of a pixel and a light above its horizon: the shadow rays of full tracing.
     pub pairs: u64,
@@ -56,8 +56,8 @@ struct Block {
     made: SkyPicture,
 }
 
-/// Makes a picture of what an eye sees under an environment and the lights that stand for it. `keeps_seen` asks for the visibility of every
-/// light at every pixel, one bit each. The bytes do not depend on the number of threads.
+/// Makes a picture of what an eye sees under an environment and the lights that stand for it. `keeps_seen` asks for the
+/// visibility of every light at every pixel, one bit each. The bytes do not depend on the number of threads.
 pub fn sky_picture(
     eye: &Eye<'_>,
     environment: &Environment,

@@ -7,8 +7,8 @@ use scene::{Environment, Rgb, Sky, luminance, texel_solid_angle};
 /// Rows at least: a map of few texels is cut finer, so that many lights find a place in it. A piece is then 1.4° high.
 const FEWEST_ROWS: u32 = 128;
 
-/// Rows at most: larger maps are taken together, so that a light's cell holds hundreds of pieces and not millions. A piece keeps the mean
-/// direction of its light, so that a sun of one texel stays where it is.
+/// Rows at most: larger maps are taken together, so that a light's cell holds hundreds of pieces and not millions. A piece
+/// keeps the mean direction of its light, so that a sun of one texel stays where it is.
 const MOST_ROWS: u32 = 512;
 
 /// A part of the sky.

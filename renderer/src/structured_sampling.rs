@@ -1,10 +1,11 @@
-//! Where lights stand in a sky, after Agarwal, Ramamoorthi, Belongie and Jensen, "Structured Importance Sampling of Environment Maps",
-//! SIGGRAPH 2003: layers of brightness are cut into regions that hang together, each gets lights by its light and its size, and within a
-//! region the next light goes where it is farthest from all others (Hochbaum and Shmoys 1985).
+//! Where lights stand in a sky, after Agarwal, Ramamoorthi, Belongie and Jensen, "Structured Importance Sampling of Environment
+//! Maps", SIGGRAPH 2003: layers of brightness are cut into regions that hang together, each gets lights by its light and its
+//! size, and within a region the next light goes where it is farthest from all others (Hochbaum and Shmoys 1985).
 //!
-//! What we do differently: regions of less than half a light get none, and what rounding leaves over goes to the largest remainders, so that
-//! the number of lights is the one asked for. Strata are the Voronoi cells of all lights, not those within a layer, and lights are relaxed to the
-//! middle of their cells: points that are as far from each other as can be have cells of uneven shape, which doubles the error of irradiance.
+//! What we do differently: regions of less than half a light get none, and what rounding leaves over goes to the largest
+//! remainders, so that the number of lights is the one asked for. Strata are the Voronoi cells of all lights, not those within
+//! a layer, and lights are relaxed to the middle of their cells: points that are as far from each other as can be have cells of
+//! uneven shape, which doubles the error of irradiance.
 
 use std::collections::VecDeque;
 
@@ -21,7 +22,8 @@ const LAYERS: u32 = 6;
 /// The paper's exponent of solid angle in a region's importance: between sampling by light (0) and by area.
 const AREA_EXPONENT: f64 = 0.25;
 
-/// The solid angle, sr, below which a region is as important as if it were that large: the paper's, of half a degree's radius or so.
+/// The solid angle, sr, below which a region is as important as if it were that large: the paper's, of half a degree's radius
+/// or so.
 const LEAST_ANGLE: f64 = 0.01;
 
 /// Directions of so many lights, fewer where the sky has not as many pieces that are lit.

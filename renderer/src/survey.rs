@@ -9,9 +9,9 @@ use crate::kd_tree::{KdTree, Slot, Spread, Visit};
 /// have a mean with (σ₁ + σ₂)/4; the rules differ in what a cell with a single sample is taken for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Rule {
-    /// As the paper has it: a sample scatters as it differs from the other half of the cell that it was parted from, and Student's t
-    /// is that of n − 1 degrees for n samples. Of fewer than four samples the external variance is asked, which is that of
-    /// nine means: a ninth of it, with eight degrees.
+    /// As the paper has it: a sample scatters as it differs from the other half of the cell that it was parted from, and
+    /// Student's t is that of n − 1 degrees for n samples. Of fewer than four samples the external variance is asked, which is
+    /// that of nine means: a ninth of it, with eight degrees.
     Paper,
     /// A sample scatters as the nine means around it do about the plane that fits them best, wherever its pixel ends. A border that
     /// all samples of a pixel missed is found out where those of the next one met it.

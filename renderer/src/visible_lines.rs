@@ -1,8 +1,8 @@
-//! Lines of a scene that are visible (Guo 1998, section 4.2): what an eye sees of segments, such as the edges of polygons. A block that
-//! one of them crosses is an edge block, however alike its corners are.
+//! Lines of a scene that are visible (Guo 1998, section 4.2): what an eye sees of segments, such as the edges of polygons. A
+//! block that one of them crosses is an edge block, however alike its corners are.
 //!
-//! What we do differently: a line is visible where a ray finds nothing before it, at points a few pixels apart; the paper has a Z-buffer,
-//! and a polygon offset that keeps it from stitching.
+//! What we do differently: a line is visible where a ray finds nothing before it, at points a few pixels apart; the paper has a
+//! Z-buffer, and a polygon offset that keeps it from stitching.
 
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
@@ -13,8 +13,8 @@ use crate::eye::Eye;
 /// Pixels between two points of a line that are looked at: what is hidden for less may be taken for visible.
 const STEP: f64 = 2.0;
 
-/// How much nearer than a point something must be to hide it, as a fraction of the distance: more shows edges behind thin plates, less
-/// hides those at contacts.
+/// How much nearer than a point something must be to hide it, as a fraction of the distance: more shows edges behind thin
+/// plates, less hides those at contacts.
 const NEARER: f64 = 1e-3;
 
 /// The nearest that a point may be to the eye, as a fraction of the scene's size.

@@ -1,7 +1,7 @@
 //! The Voronoi diagram over directions: which light stands for a direction, and which lights are beside each other.
 //!
-//! A table over all directions, as Ben-Artzi, Ramamoorthi and Agrawala 2004 have it for the upper half: cells that meet in the table are
-//! neighbours. Here the table goes all around and over the poles.
+//! A table over all directions, as Ben-Artzi, Ramamoorthi and Agrawala 2004 have it for the upper half: cells that meet in the
+//! table are neighbours. Here the table goes all around and over the poles.
 
 use std::f64::consts::{PI, TAU};
 

@@ -1,5 +1,7 @@
 //! The path of a camera through a scene: a smooth curve through cameras at given times.
 
+use std::ops::Range;
+
 use glam::{DMat3, DQuat, DVec3};
 
 use crate::Camera;
@@ -23,8 +25,9 @@ pub struct CameraKey {
 ///
 /// Between cameras every quantity is a cubic with the tangents of Catmull and Rom 1974 ("A class of local interpolating
 /// splines"), for times that need not be even: at a camera the tangent is that of the parabola through it and its two
-/// neighbours. The direction of view turns as a quaternion does, the shorter way round; what points up in the picture
-/// stays what the cameras say, so that between level cameras the picture does not roll.
+/// neighbours, but no more than three times as fast as on its slower side. The direction of view turns as a quaternion does,
+/// the shorter way round; what points up in the picture stays what the cameras say, so that between level cameras the picture
+/// does not roll.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CameraPath {
     keys: Vec<CameraKey>,
@@ -59,6 +62,14 @@ impl std::error::Error for CameraPathError {}
 /// What is interpolated of a camera: the eye, a quaternion from camera to world, the up direction, the logarithm of the distance of
 /// the target, and the opening angle.
 type Pose = [f64; 12];
+
+/// The numbers of a pose that are one thing each.
+const THINGS: [Range<usize>; 5] = [0..3, 3..7, 7..10, 10..11, 11..12];
+
+/// How many times as fast as on the slower side a thing may be where the path goes through a camera. From there on a cubic goes
+/// far beyond its ends (F. Fritsch and R. Carlson, "Monotone Piecewise Cubic Interpolation", 1980); less makes a path slow at
+/// its cameras.
+const FASTEST: f64 = 3.0;
 
 impl CameraPath {
     /// The path through cameras in the order of their times.
@@ -126,7 +137,14 @@ impl CameraPath {
         let (before, after) = (slope(key - 1), slope(key));
         let time = |key: usize| self.keys[key].time;
         let part = (time(key) - time(key - 1)) / (time(key + 1) - time(key - 1));
-        std::array::from_fn(|i| before[i] * (1.0 - part) + after[i] * part)
+        let mut tangent: Pose = std::array::from_fn(|i| before[i] * (1.0 - part) + after[i] * part);
+        for thing in THINGS {
+            let speed = |pose: &Pose| pose[thing.clone()].iter().map(|x| x * x).sum::<f64>().sqrt();
+            let most = FASTEST * speed(&before).min(speed(&after));
+            let slower = most / speed(&tangent).max(most).max(f64::MIN_POSITIVE);
+            tangent[thing].iter_mut().for_each(|x| *x *= slower);
+        }
+        tangent
     }
 }
 
@@ -234,6 +252,21 @@ mod tests {
             let change = |a: Camera, b: Camera| ((b.eye - a.eye) / step, (b.target - a.target) / step);
             let ((eye, target), (eye_after, target_after)) = (change(before, at), change(at, after));
             assert!((eye - eye_after).length() < 1e-4 && (target - target_after).length() < 1e-4, "{time}");
+        }
+    }
+
+    /// A leap of a thousandth of a second after two seconds at rest, and one into it.
+    #[test]
+    fn a_leap_does_not_throw_the_camera_about() {
+        let (near, far) = (looking([0.0; 3], [0.0, 1.2, 0.0]), looking([0.0; 3], [0.0, 7.0, -5.5]));
+        let aside = looking([0.1, 0.0, 0.0], [0.0, 1.5, 0.1]);
+        for cameras in [[(0.0, near), (2.2, aside), (2.201, far)], [(0.0, far), (0.001, near), (2.2, aside)]] {
+            let path = path(&cameras);
+            for i in 0..=2200 {
+                let camera = path.at(f64::from(i) / 1000.0);
+                assert!(camera.is_valid() && camera.eye.length() < 0.3, "{i}: {camera:?}");
+                assert!((0.5..20.0).contains(&camera.target.distance(camera.eye)), "{i}: {camera:?}");
+            }
         }
     }
 

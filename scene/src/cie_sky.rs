@@ -1,7 +1,8 @@
 //! The general skies of the CIE: the radiance of a sky from how cloudy it is and where the sun stands.
 //!
-//! ISO 15469:2004 (CIE S 011/E:2003), "Spatial distribution of daylight, CIE standard general sky": fifteen pairs of a gradation from
-//! zenith to horizon and an indicatrix about the sun, and as a sixteenth sky the traditional overcast one of Moon and Spencer 1942.
+//! ISO 15469:2004 (CIE S 011/E:2003), "Spatial distribution of daylight, CIE standard general sky": fifteen pairs of a
+//! gradation from zenith to horizon and an indicatrix about the sun, and as a sixteenth sky the traditional overcast one of
+//! Moon and Spencer 1942.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -41,8 +42,9 @@ pub struct CieSky {
 }
 
 impl CieSky {
-    /// The sky of a number, 1..=16, with the sun at an azimuth (radians clockwise from north) and an altitude (radians over the horizon,
-    /// 0..=π/2), which by itself sends so much to a surface that faces it, W·m⁻². None if a number is out of its range.
+    /// The sky of a number, 1..=16, with the sun at an azimuth (radians clockwise from north) and an altitude (radians over the
+    /// horizon, 0..=π/2), which by itself sends so much to a surface that faces it, W·m⁻². None if a number is out of its
+    /// range.
     pub fn new(kind: u8, [azimuth, altitude]: [f64; 2], sun_irradiance: f64) -> Option<Self> {
         let within = (1..=CIE_SKIES).contains(&kind)
             && azimuth.is_finite()
@@ -61,8 +63,8 @@ impl CieSky {
         self.sun_irradiance
     }
 
-    /// Radiance of the sky at an azimuth (radians clockwise from north) and an altitude (radians over the horizon), as a multiple of that of
-    /// the zenith.
+    /// Radiance of the sky at an azimuth (radians clockwise from north) and an altitude (radians over the horizon), as a
+    /// multiple of that of the zenith.
     pub fn relative_radiance(&self, azimuth: f64, altitude: f64) -> f64 {
         if altitude <= 0.0 {
             return 0.0;

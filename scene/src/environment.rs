@@ -1,7 +1,8 @@
 //! Light from far away, by its direction: a picture of all that is around, or a sky by the standard.
 //!
-//! A direction is a place in a picture whose columns are azimuths and whose rows are heights: u from 0 to 1 goes clockwise, seen from
-//! above, from south by west, north and east to south again; v from 0 at the zenith to 1 at the nadir. North is in the middle.
+//! A direction is a place in a picture whose columns are azimuths and whose rows are heights: u from 0 to 1 goes clockwise,
+//! seen from above, from south by west, north and east to south again; v from 0 at the zenith to 1 at the nadir. North is in
+//! the middle.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 

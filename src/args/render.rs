@@ -42,9 +42,9 @@ pub struct RenderFlags {
     /// The sky, where it is what lights the scene
     #[command(flatten)]
     pub sky: SkyFlags,
-    /// How much is done: samples a pixel (1.9rpp, or a bare number), seconds (30s), or samples as a share of the pixels (6%); with
-    /// --sampler coherence-map of those of the work image, and a bare number is a share, too [default: until every pixel is known; with
-    /// --sampler full 4 samples a pixel]
+    /// How much is done: samples a pixel (1.9rpp, or a bare number), seconds (30s), or samples as a share of the pixels (6%);
+    /// with --sampler coherence-map of those of the work image, and a bare number is a share, too [default: until every pixel
+    /// is known; with --sampler full 4 samples a pixel]
     #[arg(long, value_name = "N|Nrpp|Ns|N%", value_parser = budget, allow_hyphen_values = true)]
     pub budget: Option<Budget>,
     /// When a pixel is known
@@ -85,8 +85,8 @@ pub struct RadianceFlags {
     /// Paths for one sample, with --radiance path [default: 16]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=MOST_SAMPLES), allow_negative_numbers = true)]
     pub paths: Option<u32>,
-    /// Interreflections followed, with --radiance path, gather or interpolant; 0 is direct light only [default: to convergence, or as
-    /// a .hlf file was baked]
+    /// Interreflections followed, with --radiance path, gather or interpolant; 0 is direct light only [default: to convergence,
+    /// or as a .hlf file was baked]
     #[arg(long, value_name = "N", allow_negative_numbers = true)]
     pub bounces: Option<u32>,
 }

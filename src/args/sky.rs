@@ -15,8 +15,8 @@ const MOST_LIGHTS: i64 = 4096;
 /// Light from the sky.
 #[derive(Clone, Debug, Args)]
 pub struct SkyFlags {
-    /// Light the scene by the sky alone, a ray from each pixel's middle: a picture of all directions (.hdr, .exr), or a general sky of the CIE,
-    /// cie:1 to cie:16
+    /// Light the scene by the sky alone, a ray from each pixel's middle: a picture of all directions (.hdr, .exr), or a general
+    /// sky of the CIE, cie:1 to cie:16
     #[arg(long, value_name = "MAP|cie:N", value_parser = source, conflicts_with_all = [
         "sampler", "radiance", "paths", "bounces", "budget", "level", "interval", "perceptual", "rule", "filter", "interpolation", "snapshots",
         "sample_map", "seed",
@@ -28,11 +28,12 @@ pub struct SkyFlags {
     /// How the lights are placed
     #[arg(long, value_enum, default_value_t, requires = "environment")]
     pub sky_sampling: SkySamplingChoice,
-    /// How it is found which lights are seen: a ray to each (full), or by the names of Ben-Artzi et al.: scanline or grid, warping or none, boundary or
-    /// uncertainty flooding; opt is gnu with both restrictions, of which each may stand alone
+    /// How it is found which lights are seen: a ray to each (full), or by the names of Ben-Artzi et al.: scanline or grid,
+    /// warping or none, boundary or uncertainty flooding; opt is gnu with both restrictions, of which each may stand alone
     #[arg(long, default_value = "gnu", value_parser = visibility(), requires = "environment")]
     pub visibility: NamedVisibility,
-    /// Of the lights that are brightest on a pixel so many are doubted wherever seen and hidden lights meet: more rays, fewer errors that are seen
+    /// Of the lights that are brightest on a pixel so many are doubted wherever seen and hidden lights meet: more rays, fewer
+    /// errors that are seen
     #[arg(long, value_name = "K", default_value_t = 0, requires = "environment", allow_negative_numbers = true)]
     pub brightest: u32,
     /// Part of an unobstructed pixel's light that may be guessed: the faintest of the lights that are in doubt are not traced
@@ -47,7 +48,8 @@ pub struct SkyFlags {
     /// The axis of the scene that points up under the sky
     #[arg(long, default_value = "z", value_parser = up_axis(), requires = "environment")]
     pub sky_up: UpAxis,
-    /// Where the sun stands in a CIE sky: degrees clockwise from north, which is y where z is up, and over the horizon [default: 135,45]
+    /// Where the sun stands in a CIE sky: degrees clockwise from north, which is y where z is up, and over the horizon
+    /// [default: 135,45]
     #[arg(long, value_name = "AZIMUTH,ALTITUDE", value_parser = sun, requires = "environment", allow_hyphen_values = true)]
     pub sun: Option<[f64; 2]>,
     /// What the sun itself sends to a surface that faces it in a CIE sky, W/m², before --sky-scale [default: nothing]
@@ -56,8 +58,8 @@ pub struct SkyFlags {
     /// Trace every shadow ray as well, and count the predictions that are wrong
     #[arg(long, requires = "environment")]
     pub check: bool,
-    /// Where a map of the shadow rays goes: from black, none in a pixel, to white, one to each light; with --check red where a prediction
-    /// is wrong
+    /// Where a map of the shadow rays goes: from black, none in a pixel, to white, one to each light; with --check red where a
+    /// prediction is wrong
     #[arg(long, value_name = "FILE.png", value_parser = png_path, requires = "environment")]
     pub ray_map: Option<PathBuf>,
     /// Where a picture of the sky goes, with the lights and the cells of directions that they stand for

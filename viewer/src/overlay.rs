@@ -88,8 +88,8 @@ impl Overlay {
         (over_panel, response.repaint)
     }
 
-    /// Lays the panels out over a walk, and a finer picture of a size in pixels below them; what their buttons ask for, whether they
-    /// change by themselves, and how they look.
+    /// Lays the panels out over a walk, and a finer picture of a size in pixels below them; what their buttons ask for, whether
+    /// they change by themselves, and how they look.
     pub fn lay_out(
         &mut self,
         walk: &mut Walk,

@@ -77,8 +77,8 @@ pub struct Refined {
     pub samples_a_pixel: f64,
 }
 
-/// Refines the picture of a bake: shows finer and finer ones, until there is no finer one or none is wanted. Called on a thread of its
-/// own.
+/// Refines the picture of a bake: shows finer and finer ones, until there is no finer one or none is wanted. Called on a thread
+/// of its own.
 pub type Refine =
     dyn Fn(&Arc<Baked>, &Frame, &(dyn Fn() -> bool + Sync), &dyn Fn(Refined)) -> Result<(), String> + Send + Sync;
 

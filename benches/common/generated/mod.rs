@@ -1,8 +1,8 @@
 //! Scenes made by rule, at any size: what growth is measured on, and what nobody has to draw.
 //!
-//! The same size gives the same scene, byte for byte. All are wound counter-clockwise seen from the front, without faces that overlap in
-//! one plane; faces that stand on another are left out. Hall and rooms are closed and lit from the inside; shapes, dominoes and plant stand
-//! on a floor under the sky.
+//! The same size gives the same scene, byte for byte. All are wound counter-clockwise seen from the front, without faces that
+//! overlap in one plane; faces that stand on another are left out. Hall and rooms are closed and lit from the inside; shapes,
+//! dominoes and plant stand on a floor under the sky.
 
 #![allow(dead_code, reason = "each bench, test and example uses its part")]
 

@@ -126,7 +126,8 @@ impl Modeller {
         self.face(material, &outline.iter().rev().copied().collect::<Vec<_>>());
     }
 
-    /// The surface over a grid of so many cells, two triangles each, counter-clockwise where u goes right and v up; u and v from 0 to 1.
+    /// The surface over a grid of so many cells, two triangles each, counter-clockwise where u goes right and v up; u and v
+    /// from 0 to 1.
     pub fn surface(&mut self, material: u32, [columns, rows]: [u32; 2], at: impl Fn(f64, f64) -> DVec3) {
         let at = |i: u32, j: u32| at(f64::from(i) / f64::from(columns), f64::from(j) / f64::from(rows));
         for (i, j) in (0..rows).flat_map(|j| (0..columns).map(move |i| (i, j))) {
