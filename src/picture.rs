@@ -20,8 +20,6 @@ const CHUNK: usize = 1024;
 /// A picture in the making.
 pub struct Picture {
     sampler: Sampler,
-    /// None where the sampler makes its own picture.
-    film: Option<Reconstruction>,
     /// Rays of all samples, those from the eye included.
     rays: u64,
     seconds: Seconds,
@@ -52,20 +50,20 @@ impl Picture {
         let (points, first): (Vec<DVec2>, Vec<Evaluation>) =
             sampler.points().map(|(point, radiance)| (point, seen(radiance))).unzip();
         film.add(&points, &first, &sampler.tiles());
-        let sampler = Sampler::Adaptive(Box::new(sampler));
-        Some(Self { rays: sampler.samples(), sampler, film: Some(film), seconds: Seconds::default() })
+        let sampler = Sampler::Adaptive(Box::new(sampler), film);
+        Some(Self { rays: sampler.samples(), sampler, seconds: Seconds::default() })
     }
 
     /// One with so many samples a pixel, spread evenly. None of a size that cannot be.
     pub fn uniform((width, height): (u32, u32), a_pixel: f64, seed: u64, film: Reconstruction) -> Option<Self> {
-        let sampler = Sampler::Uniform(UniformSampler::new(width, height, a_pixel, seed)?);
-        Some(Self { rays: 0, sampler, film: Some(film), seconds: Seconds::default() })
+        let sampler = Sampler::Uniform(UniformSampler::new(width, height, a_pixel, seed)?, film);
+        Some(Self { rays: 0, sampler, seconds: Seconds::default() })
     }
 
     /// One of a coherence map, through a filter: of what a display shows, or of radiance.
     pub fn coherent(map: CoherenceMap, filter: Filter, display: Option<Display>) -> Self {
         let sampler = Sampler::Coherent { map: Box::new(map), filter, display };
-        Self { rays: 0, sampler, film: None, seconds: Seconds::default() }
+        Self { rays: 0, sampler, seconds: Seconds::default() }
     }
 
     /// Takes a batch of samples, at most so many, fewer if it gets late; false if there is nothing left to do.
@@ -78,7 +76,7 @@ impl Picture {
         let seen = timed(&mut self.seconds.evaluate, || seen_at(&batch, evaluate, late));
         self.rays += seen.iter().map(|evaluation| u64::from(evaluation.cost)).sum::<u64>();
         let tiles = timed(&mut self.seconds.generate, || self.sampler.take(&seen));
-        if let Some(film) = &mut self.film {
+        if let Sampler::Adaptive(_, film) | Sampler::Uniform(_, film) = &mut self.sampler {
             timed(&mut self.seconds.reconstruct, || film.add(&batch, &seen, &tiles));
         }
         true
@@ -86,9 +84,9 @@ impl Picture {
 
     /// The picture so far, row by row: radiance, W·sr⁻¹·m⁻², or what a display shows.
     pub fn light(&mut self) -> Vec<Vec3> {
-        timed(&mut self.seconds.reconstruct, || match (&self.sampler, &self.film) {
-            (Sampler::Coherent { map, filter, display }, _) => map.picture(*filter, *display),
-            (_, film) => film.as_ref().map_or_else(Vec::new, Reconstruction::picture),
+        timed(&mut self.seconds.reconstruct, || match &self.sampler {
+            Sampler::Adaptive(_, film) | Sampler::Uniform(_, film) => film.picture(),
+            Sampler::Coherent { map, filter, display } => map.picture(*filter, *display),
         })
     }
 
@@ -105,8 +103,8 @@ impl Picture {
     /// Samples whose radiance was no finite number.
     pub fn excluded(&self) -> u64 {
         match &self.sampler {
-            Sampler::Adaptive(sampler) => sampler.excluded(),
-            Sampler::Uniform(sampler) => sampler.excluded(),
+            Sampler::Adaptive(sampler, _) => sampler.excluded(),
+            Sampler::Uniform(sampler, _) => sampler.excluded(),
             Sampler::Coherent { map, .. } => map.excluded(),
         }
     }
@@ -115,23 +113,23 @@ impl Picture {
     pub fn map(&self) -> Option<&CoherenceMap> {
         match &self.sampler {
             Sampler::Coherent { map, .. } => Some(map),
-            Sampler::Adaptive(_) | Sampler::Uniform(_) => None,
+            Sampler::Adaptive(..) | Sampler::Uniform(..) => None,
         }
     }
 
     /// Pixels that are known, 0..=1; none where the sampler does not ask.
     pub fn closed_share(&self) -> Option<f64> {
         match &self.sampler {
-            Sampler::Adaptive(sampler) => Some(sampler.closed_share()),
-            Sampler::Uniform(_) | Sampler::Coherent { .. } => None,
+            Sampler::Adaptive(sampler, _) => Some(sampler.closed_share()),
+            Sampler::Uniform(..) | Sampler::Coherent { .. } => None,
         }
     }
 
     /// How many samples lie in each pixel, row by row.
     pub fn samples_per_pixel(&self) -> Vec<u32> {
         match &self.sampler {
-            Sampler::Adaptive(sampler) => sampler.samples_per_pixel(),
-            Sampler::Uniform(sampler) => sampler.samples_per_pixel(),
+            Sampler::Adaptive(sampler, _) => sampler.samples_per_pixel(),
+            Sampler::Uniform(sampler, _) => sampler.samples_per_pixel(),
             Sampler::Coherent { map, .. } => map.samples_per_pixel(),
         }
     }
@@ -142,26 +140,26 @@ impl Picture {
     }
 }
 
-/// A sampler of any kind.
+/// A sampler of any kind, and what makes a picture of its samples; a coherence map makes its own.
 enum Sampler {
-    Adaptive(Box<AdaptiveSampler>),
-    Uniform(UniformSampler),
+    Adaptive(Box<AdaptiveSampler>, Reconstruction),
+    Uniform(UniformSampler, Reconstruction),
     Coherent { map: Box<CoherenceMap>, filter: Filter, display: Option<Display> },
 }
 
 impl Sampler {
     fn next_batch(&mut self, most: usize) -> Vec<DVec2> {
         match self {
-            Self::Adaptive(sampler) => sampler.next_batch(most),
-            Self::Uniform(sampler) => sampler.next_batch(most.min(CHUNK)),
+            Self::Adaptive(sampler, _) => sampler.next_batch(most),
+            Self::Uniform(sampler, _) => sampler.next_batch(most.min(CHUNK)),
             Self::Coherent { map, .. } => map.next_batch(most),
         }
     }
 
     fn take(&mut self, seen: &[Evaluation]) -> Vec<Tile> {
         match self {
-            Self::Adaptive(sampler) => sampler.take(seen),
-            Self::Uniform(sampler) => sampler.take(seen),
+            Self::Adaptive(sampler, _) => sampler.take(seen),
+            Self::Uniform(sampler, _) => sampler.take(seen),
             Self::Coherent { map, .. } => {
                 map.take(seen);
                 Vec::new()
@@ -171,8 +169,8 @@ impl Sampler {
 
     fn samples(&self) -> u64 {
         match self {
-            Self::Adaptive(sampler) => sampler.samples() as u64,
-            Self::Uniform(sampler) => sampler.samples(),
+            Self::Adaptive(sampler, _) => sampler.samples() as u64,
+            Self::Uniform(sampler, _) => sampler.samples(),
             Self::Coherent { map, .. } => map.evaluated() as u64,
         }
     }

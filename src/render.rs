@@ -31,9 +31,6 @@ const FULL: f64 = 4.0;
 /// Columns and rows of the grid that the light of a picture is metered on, as `shot` has it.
 const METER_GRID: u32 = 32;
 
-/// Pixels of a coherence map's work image along a side of each of the picture's: Guo's.
-const SUPERSAMPLE: u32 = 3;
-
 /// Samples of the first snapshot.
 const FIRST_SNAPSHOT: u64 = 1024;
 
@@ -46,6 +43,9 @@ pub fn run(flags: &RenderFlags, outputs: &Outputs, interrupt: &Interrupt) -> Res
     radiance::check(&flags.radiance)?;
     check(flags)?;
     let limit = Limit::of(flags)?;
+    if flags.sampler == SamplerChoice::CoherenceMap {
+        check_budget(flags, &limit)?;
+    }
     let full = flags.compare.as_deref().map(|path| full_picture(path, flags.size)).transpose()?;
     let output = outputs.claim(&flags.output)?;
     let coherence = flags.coherence.map.as_deref().map(|path| outputs.claim(path)).transpose()?;
@@ -59,11 +59,7 @@ pub fn run(flags: &RenderFlags, outputs: &Outputs, interrupt: &Interrupt) -> Res
             ExposureChoice::Fixed(exposure) => exposure,
             ExposureChoice::Auto => meter(evaluate, flags.size),
         };
-        let display = Display::new(exposure, flags.tone_curve);
-        let mut picture = match flags.sampler {
-            SamplerChoice::CoherenceMap => begin_coherent(flags, exposure, &limit, lines)?,
-            _ => begin(flags, display, &limit, evaluate)?,
-        };
+        let mut picture = begin(flags, exposure, &limit, evaluate, lines)?;
         let snapshot = |picture: &mut Picture| -> Result<()> {
             let Some(folder) = &flags.snapshots else { return Ok(()) };
             let name = format!("{:012}", picture.samples());
@@ -90,8 +86,23 @@ fn check(flags: &RenderFlags) -> Result<()> {
     if is_coherent && flags.interpolation != Interpolation::Constant {
         bail!(Usage("--interpolation: a coherence map has its own; leave it out".into()));
     }
-    if flags.compare.is_some() && ImageKind::of(&flags.output) != Some(ImageKind::Exr) {
+    if flags.compare.is_some() && !flags.is_exr() {
         bail!(Usage("--compare is of radiance; let the name of --output end in .exr".into()));
+    }
+    Ok(())
+}
+
+/// Refuses a budget that a coherence map's first blocks need more than.
+fn check_budget(flags: &RenderFlags, limit: &Limit) -> Result<()> {
+    let ((width, height), supersample) = (flags.size, flags.supersample());
+    let (least, samples) = (CoherenceMap::least(width, height, supersample), limit.samples);
+    if samples < least {
+        let pixels = f64::from(width) * f64::from(height) * f64::from(supersample).powi(2);
+        let share = 100.0 * least as f64 / pixels;
+        bail!(Usage(format!(
+            "--budget: {samples} samples are too few for the corners of the map's first blocks; they need {least}, {share:.2} % \
+             of the work image"
+        )));
     }
     Ok(())
 }
@@ -121,7 +132,7 @@ impl Limit {
         let pixels = f64::from(flags.size.0) * f64::from(flags.size.1);
         let samples =
             |a_pixel: f64| Self { samples: (a_pixel * pixels).round().max(1.0) as u64, seconds: f64::INFINITY };
-        let supersample = f64::from(flags.coherence.supersample.unwrap_or(SUPERSAMPLE));
+        let supersample = f64::from(flags.supersample());
         Ok(match (flags.budget, flags.sampler) {
             (Some(Budget::Share(share) | Budget::Bare(share)), SamplerChoice::CoherenceMap) => {
                 samples(share * supersample * supersample)
@@ -143,11 +154,17 @@ impl Limit {
 }
 
 /// Begins the picture that flags ask for.
-fn begin(flags: &RenderFlags, display: Display, limit: &Limit, evaluate: &Evaluator<'_>) -> Result<Picture> {
+fn begin(
+    flags: &RenderFlags,
+    exposure: Exposure,
+    limit: &Limit,
+    evaluate: &Evaluator<'_>,
+    lines: &Lines<'_>,
+) -> Result<Picture> {
     let (width, height) = flags.size;
-    let is_exr = ImageKind::of(&flags.output) == Some(ImageKind::Exr);
+    let display = Display::new(exposure, flags.tone_curve);
     let filter = flags.filter.map_or(Filter::Lanczos, Filter::from);
-    let film = Reconstruction::new(flags.size, filter, flags.interpolation, (!is_exr).then_some(display));
+    let film = || Reconstruction::new(flags.size, filter, flags.interpolation, (!flags.is_exr()).then_some(display));
     let picture = match flags.sampler {
         SamplerChoice::Adaptive => {
             let options = AdaptiveOptions {
@@ -157,11 +174,12 @@ fn begin(flags: &RenderFlags, display: Display, limit: &Limit, evaluate: &Evalua
                 interval: flags.confidence.interval(),
                 display,
             };
-            Picture::adaptive(flags.size, &options, film, evaluate)
+            Picture::adaptive(flags.size, &options, film(), evaluate)
         }
-        SamplerChoice::Full | SamplerChoice::CoherenceMap => {
+        SamplerChoice::CoherenceMap => return begin_coherent(flags, exposure, lines),
+        SamplerChoice::Full => {
             let a_pixel = limit.samples as f64 / (f64::from(width) * f64::from(height));
-            Picture::uniform(flags.size, a_pixel, flags.seed, film)
+            Picture::uniform(flags.size, a_pixel, flags.seed, film())
         }
     };
     picture.ok_or_else(|| {
@@ -171,25 +189,16 @@ fn begin(flags: &RenderFlags, display: Display, limit: &Limit, evaluate: &Evalua
 }
 
 /// Begins the picture of a coherence map.
-fn begin_coherent(flags: &RenderFlags, exposure: Exposure, limit: &Limit, lines: &Lines<'_>) -> Result<Picture> {
+fn begin_coherent(flags: &RenderFlags, exposure: Exposure, lines: &Lines<'_>) -> Result<Picture> {
     let (width, height) = flags.size;
-    let is_exr = ImageKind::of(&flags.output) == Some(ImageKind::Exr);
-    let supersample = flags.coherence.supersample.unwrap_or(SUPERSAMPLE);
-    let options = CoherenceOptions { supersample, exposure, curve: (!is_exr).then_some(flags.tone_curve) };
+    let supersample = flags.supersample();
+    let options = CoherenceOptions { supersample, exposure, curve: (!flags.is_exr()).then_some(flags.tone_curve) };
     let map = CoherenceMap::new(width, height, &options, &lines.visible()).ok_or_else(|| {
         let why = "the work image cannot be that large; ask for fewer pixels";
         Usage(format!("--size {width}x{height} with --supersample {supersample}: {why}"))
     })?;
-    if limit.samples < map.least() as u64 {
-        let share = 100.0 * map.least() as f64 / map.pixels() as f64;
-        bail!(Usage(format!(
-            "--budget: {} samples are too few for the corners of the map's first blocks; they need {}, {share:.2} % of the work image",
-            limit.samples,
-            map.least()
-        )));
-    }
     let filter = flags.filter.map_or(Filter::Gaussian, Filter::from);
-    Ok(Picture::coherent(map, filter, (!is_exr).then_some(Display::new(exposure, flags.tone_curve))))
+    Ok(Picture::coherent(map, filter, (!flags.is_exr()).then_some(Display::new(exposure, flags.tone_curve))))
 }
 
 /// Samples until the limit is reached, nothing is left to do, or Ctrl-C; writes snapshots on the way.

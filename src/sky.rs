@@ -42,7 +42,7 @@ pub fn run(flags: &RenderFlags, source: &SkySource, outputs: &Outputs) -> Result
     let camera = camera(&viewpoint, &scene)?;
     let stage = Stage::start("lights");
     let lights = EnvironmentLights::new(&environment, sky.lights, sky.sky_sampling.into());
-    let lights = lights.context("the sky is black; give one with light in it")?;
+    let lights = lights.with_context(|| format!("{source}: the sky is black; give one with light in it"))?;
     stage.end();
     if lights.count() < sky.lights {
         let (found, asked) = (lights.count(), sky.lights);

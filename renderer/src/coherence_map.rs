@@ -140,6 +140,14 @@ impl CoherenceMap {
         Some(Self { options: *options, image, lines, leaves, batch: Vec::new(), excluded: 0 })
     }
 
+    /// Pixels of the work image that are evaluated, at least, before its blocks are elementary: with fewer the picture is worth
+    /// little.
+    pub fn least(width: u32, height: u32, supersample: u32) -> u64 {
+        let corners =
+            |side: u32| (u64::from(side) * u64::from(supersample)).saturating_sub(1).div_ceil(ELEMENTARY.into()) + 1;
+        corners(width) * corners(height)
+    }
+
     /// The points to be looked at next, at most so many, in pixels of the picture; none when all are evaluated.
     pub fn next_batch(&mut self, most: usize) -> Vec<DVec2> {
         let most = most.min((self.image.evaluated() / GROWTH).max(FIRST_BATCH));
@@ -191,11 +199,6 @@ impl CoherenceMap {
     pub fn pixels(&self) -> usize {
         let [width, height] = self.image.size().map(|side| side as usize);
         width * height
-    }
-
-    /// Pixels that are evaluated, at least, before blocks are elementary: with fewer the picture is worth little.
-    pub fn least(&self) -> usize {
-        self.image.size().map(|side| (side - 1).div_ceil(ELEMENTARY) as usize + 1).iter().product()
     }
 
     /// Evaluated pixels whose radiance was no finite number.

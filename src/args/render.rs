@@ -6,8 +6,11 @@ use clap::{Args, ValueEnum};
 use renderer::{Filter, Interval, Rule};
 use scene::ToneCurve;
 
-use super::{CameraFlags, ExposureChoice, MOST_SAMPLES, SceneFlags, SkyFlags};
+use super::{CameraFlags, ExposureChoice, ImageKind, MOST_SAMPLES, SceneFlags, SkyFlags};
 use super::{exposure, fraction, image_path, number, png_path, positive, size, tone_curve};
+
+/// Pixels of a coherence map's work image along a side of each of the picture's, where nothing is said: Guo's.
+const SUPERSAMPLE: u32 = 3;
 
 /// `halflight render`.
 #[derive(Debug, Args)]
@@ -74,6 +77,18 @@ pub struct RenderFlags {
     /// Print one JSON object on stdout: samples, and seconds by stage
     #[arg(long)]
     pub json: bool,
+}
+
+impl RenderFlags {
+    /// Whether the picture is one of radiance, and not of what a display shows.
+    pub fn is_exr(&self) -> bool {
+        ImageKind::of(&self.output) == Some(ImageKind::Exr)
+    }
+
+    /// Pixels of a coherence map's work image along a side of each of the picture's.
+    pub fn supersample(&self) -> u32 {
+        self.coherence.supersample.unwrap_or(SUPERSAMPLE)
+    }
 }
 
 /// What a sample sees.

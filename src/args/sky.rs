@@ -76,6 +76,15 @@ pub enum SkySource {
     Cie(u8),
 }
 
+impl std::fmt::Display for SkySource {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Map(path) => write!(f, "{}", path.display()),
+            Self::Cie(kind) => write!(f, "cie:{kind}"),
+        }
+    }
+}
+
 /// How lights are placed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub enum SkySamplingChoice {
