@@ -17,14 +17,13 @@ use glam::{DVec2, DVec3, Vec3};
 use point_gather::PointGather;
 use rayon::prelude::*;
 use renderer::{
-    AdaptiveOptions, AdaptiveSampler, Evaluation, Evaluator, Eye, Film, Filter, Interval, Rule, Sight, SurfacePoint,
+    AdaptiveOptions, AdaptiveSampler, Evaluation, Evaluator, Eye, Film, Filter, Rule, Sight, SurfacePoint,
     UniformSampler, Whitted, sample_histogram,
 };
 use scene::{Bvh, Camera, Display, Exposure, Gloss, Light, Material, Rgb, Scene, ToneCurve};
 use solver::{Gather, SolveOptions};
 
-/// The paper's confidence.
-const LEVEL: f64 = 0.99;
+/// The interval of the paper's confidence, which pixels are held to.
 const INTERVAL: f64 = 1.0 / 255.0;
 
 /// The paper's sizes.
@@ -227,7 +226,7 @@ struct Made {
 
 /// The paper's confidence.
 fn options(display: Display, rule: Rule, seed: u64) -> AdaptiveOptions {
-    AdaptiveOptions { seed, rule, level: LEVEL, interval: Interval::Linear(INTERVAL), display }
+    AdaptiveOptions { seed, rule, ..AdaptiveOptions::of(display) }
 }
 
 /// Makes a picture until it is complete or has so many samples.

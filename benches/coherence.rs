@@ -14,7 +14,7 @@ use point_gather::PointGather;
 use rayon::prelude::*;
 use renderer::{
     AdaptiveOptions, AdaptiveSampler, CoherenceMap, CoherenceOptions, Evaluation, Evaluator, Eye, Film, Filter,
-    Interval, Rule, object_edges, visible_lines,
+    object_edges, visible_lines,
 };
 use scene::{Bvh, Display, Exposure, ToneCurve, luminance};
 use solver::{Gather, SolveOptions};
@@ -111,9 +111,7 @@ fn picture(eye: &Eye<'_>, side: u32, most: usize, compared: Compared, evaluate: 
 }
 
 fn adaptive(side: u32, most: usize, display: Display, evaluate: &Evaluator<'_>) -> Vec<Vec3> {
-    let interval = Interval::Linear(1.0 / 255.0);
-    let options = AdaptiveOptions { seed: 1, rule: Rule::Calibrated, level: 0.99, interval, display };
-    let mut sampler = AdaptiveSampler::new(side, side, &options, evaluate).unwrap();
+    let mut sampler = AdaptiveSampler::new(side, side, &AdaptiveOptions::of(display), evaluate).unwrap();
     loop {
         let batch = sampler.next_batch(most - sampler.samples());
         if batch.is_empty() {

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result};
 use rayon::ThreadPoolBuilder;
-use renderer::{AdaptiveOptions, Evaluator, Filter, Interval, Rule};
+use renderer::{AdaptiveOptions, Evaluator, Filter};
 use scene::{Baked, Display, Exposure};
 use viewer::{Frame, Refined};
 
@@ -56,13 +56,7 @@ pub fn refine(
 
 /// The picture that `render` draws by default.
 fn begin(size: (u32, u32), display: Display, evaluate: &Evaluator<'_>) -> Option<Picture> {
-    let options = AdaptiveOptions {
-        seed: SEED,
-        rule: Rule::Calibrated,
-        level: 0.99,
-        interval: Interval::Linear(1.0 / 255.0),
-        display,
-    };
+    let options = AdaptiveOptions { seed: SEED, ..AdaptiveOptions::of(display) };
     let film = Reconstruction::new(size, Filter::Lanczos, Interpolation::Constant, Some(display));
     Picture::adaptive(size, &options, film, evaluate)
 }

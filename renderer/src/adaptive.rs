@@ -62,6 +62,13 @@ pub struct AdaptiveOptions {
     pub display: Display,
 }
 
+impl AdaptiveOptions {
+    /// For a display: 99 % and a step of 255, as in the paper's figures, by the calibrated rule.
+    pub fn of(display: Display) -> Self {
+        Self { seed: 1, rule: Rule::Calibrated, level: 0.99, interval: Interval::Linear(1.0 / 255.0), display }
+    }
+}
+
 /// Samples of a picture, and where the next ones go.
 ///
 /// Asked for a batch of points ([`AdaptiveSampler::next_batch`]) and told what is seen there ([`AdaptiveSampler::take`]), until
@@ -307,28 +314,11 @@ fn keep_largest(open: &mut Vec<(f32, Slot, Cell)>, most: usize, seed: u64) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::test_pictures::{disk, display, holes};
     use crate::{Film, Filter};
-    use scene::{Exposure, ToneCurve};
-
-    fn display() -> Display {
-        Display::new(Exposure { ev: 0.0 }, ToneCurve::Shoulder)
-    }
 
     fn usual() -> AdaptiveOptions {
-        AdaptiveOptions {
-            seed: 1,
-            rule: Rule::Calibrated,
-            level: 0.99,
-            interval: Interval::Linear(1.0 / 255.0),
-            display: display(),
-        }
-    }
-
-    /// A bright disk of 13.5 pixels about (20, 15) on a ground whose brightness rises to the right.
-    fn disk(point: DVec2) -> Evaluation {
-        let inside = point.distance(DVec2::new(20.0, 15.0)) < 13.5;
-        let radiance = if inside { Vec3::new(0.9, 0.5, 0.1) } else { Vec3::splat(0.002 * point.x as f32) };
-        Evaluation { radiance, object: 1 + u32::from(inside), cost: 1 }
+        AdaptiveOptions::of(display())
     }
 
     /// Samples until nothing is left to do or there are so many.
@@ -458,14 +448,6 @@ mod tests {
 
     #[test]
     fn what_is_no_number_is_excluded() {
-        let holes = |point: DVec2| {
-            let bad = match (point.x * 7.3 + point.y * 11.7).fract() {
-                x if x < 0.05 => f32::NAN,
-                x if x < 0.1 => f32::INFINITY,
-                _ => 0.3,
-            };
-            Evaluation { radiance: Vec3::new(0.3, bad, 0.3), object: 1, cost: 1 }
-        };
         let sampler = refined((32, 32), &usual(), usize::MAX, &holes);
         let share = sampler.excluded() as f64 / sampler.samples() as f64;
         assert!((share - 0.1).abs() < 0.03 && sampler.closed_share() == 1.0, "{share}");

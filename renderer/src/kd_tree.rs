@@ -390,11 +390,7 @@ fn transposed(lines: [Line; 3]) -> [Line; 3] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use scene::{Exposure, ToneCurve};
-
-    fn display() -> Display {
-        Display::new(Exposure { ev: 0.0 }, ToneCurve::Shoulder)
-    }
+    use crate::test_pictures::display;
 
     /// The spread of means that a function gives at −1, 0 and 1, less that in the middle.
     fn spread(value: impl Fn(f32, f32) -> f32) -> Spread {

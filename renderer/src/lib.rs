@@ -41,6 +41,8 @@ mod spherical_triangle;
 mod structured_sampling;
 mod surface;
 mod survey;
+#[cfg(test)]
+mod test_pictures;
 mod uniform;
 mod visible_lines;
 mod voronoi;

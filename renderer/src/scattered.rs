@@ -81,7 +81,7 @@ fn planes(mesh: &Mesh) -> Vec<Plane> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{AdaptiveOptions, AdaptiveSampler, Evaluation, Film, Interval, Rule};
+    use crate::{AdaptiveOptions, AdaptiveSampler, Evaluation, Film, Interval};
     use scene::{Exposure, ToneCurve};
 
     const SIZE: (u32, u32) = (40, 30);
@@ -124,13 +124,8 @@ mod tests {
     fn all_surfaces_converge_to_the_same_picture() {
         let display = Display::new(Exposure { ev: 0.5 }, ToneCurve::Shoulder);
         let pictures = |interval: f64, filter: Filter| {
-            let options = AdaptiveOptions {
-                seed: 3,
-                rule: Rule::Calibrated,
-                level: 0.99,
-                interval: Interval::Linear(interval),
-                display,
-            };
+            let options =
+                AdaptiveOptions { seed: 3, interval: Interval::Linear(interval), ..AdaptiveOptions::of(display) };
             let mut sampler = AdaptiveSampler::new(SIZE.0, SIZE.1, &options, &disk).expect("a picture");
             loop {
                 let batch = sampler.next_batch(usize::MAX);

@@ -1,16 +1,10 @@
 use super::*;
 use crate::filter::Filter;
 use crate::reduction::Reduction;
+use crate::test_pictures::{disk, display, holes};
 
 fn usual(supersample: u32) -> CoherenceOptions {
     CoherenceOptions { supersample, exposure: Exposure { ev: 0.0 }, curve: Some(ToneCurve::Shoulder) }
-}
-
-/// A bright disk of 13.5 pixels about (20, 15) on a ground whose brightness rises to the right.
-fn disk(point: DVec2) -> Evaluation {
-    let inside = point.distance(DVec2::new(20.0, 15.0)) < 13.5;
-    let radiance = if inside { Vec3::new(0.9, 0.5, 0.1) } else { Vec3::splat(0.1 + 0.002 * point.x as f32) };
-    Evaluation { radiance, object: 1 + u32::from(inside), cost: 1 }
 }
 
 /// Evaluates until nothing is left to do or so many pixels are.
@@ -136,10 +130,7 @@ fn the_same_pixels_are_evaluated_on_any_number_of_threads() {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
         pool.install(|| {
             let map = refined((200, 150), 2, 20_000, &disk);
-            (
-                map.samples_per_pixel(),
-                map.picture(Filter::Lanczos, Some(Display::new(Exposure { ev: 0.0 }, ToneCurve::Shoulder))),
-            )
+            (map.samples_per_pixel(), map.picture(Filter::Lanczos, Some(display())))
         })
     };
     let one = image(1);
@@ -149,14 +140,6 @@ fn the_same_pixels_are_evaluated_on_any_number_of_threads() {
 
 #[test]
 fn what_is_no_number_is_excluded() {
-    let holes = |point: DVec2| {
-        let bad = match (point.x * 7.3 + point.y * 11.7).fract() {
-            x if x < 0.05 => f32::NAN,
-            x if x < 0.1 => f32::INFINITY,
-            _ => 0.3,
-        };
-        Evaluation { radiance: Vec3::new(0.3, bad, 0.3), object: 1, cost: 1 }
-    };
     let map = refined((32, 32), 1, usize::MAX, &holes);
     assert!(map.excluded() > 20 && map.excluded() < 300, "{}", map.excluded());
     assert!(map.work_image().iter().all(|pixel| (*pixel - 0.3).abs().max_element() < 1e-6));
