@@ -6,7 +6,7 @@
 //! | 8..12 | version, u32 |
 //! | 12..16 | length of the header, u32 |
 //! | 16..20 | CRC-32 of bytes 0..16 and the header, u32 |
-//! | 20.. | header: what made the bake, its error, materials, textures' names and sizes, objects, cameras, lights and the table of sections, in bincode |
+//! | 20.. | header: what made the bake, its error, materials, textures' names and sizes, objects, cameras, lights, environment and the table of sections, in bincode |
 //! | then | the sections, one after another without gaps |
 //!
 //! Everything is little-endian. A section is an array of fixed-size rows: positions in metres, irradiance in W·m⁻²,
@@ -17,7 +17,11 @@ use std::fs;
 use std::io::Read;
 use std::path::Path;
 
-use scene::{Baked, BakedError, Light, Material, NamedCamera, Provenance, Scene, Texture, Unfinished};
+use glam::Vec3;
+use scene::{
+    Baked, BakedError, Environment, LatLongMap, Light, Material, NamedCamera, Provenance, Scene, Sky, Texture,
+    Unfinished,
+};
 use serde::{Deserialize, Serialize};
 
 use crate::record::{Record, from_bytes, to_bytes};
@@ -27,7 +31,7 @@ use crate::{FormatError, write_atomically};
 const MAGIC: [u8; 8] = *b"\x89HLF\r\n\x1a\n";
 
 /// Raised with every change that an older program would misread.
-const VERSION: u32 = 4;
+const VERSION: u32 = 5;
 
 /// Bytes before the header.
 const PREAMBLE: usize = 20;
@@ -45,6 +49,8 @@ struct Header {
     objects: Vec<String>,
     cameras: Vec<NamedCamera>,
     lights: Vec<Light>,
+    /// Without the texels of a map, which are a section.
+    environment: Option<Environment>,
     sections: Vec<Section>,
 }
 
@@ -94,6 +100,7 @@ fn write(path: &Path, baked: &Baked, unfinished: Option<&Unfinished>) -> Result<
         ("scene polygons", to_bytes(&scene.polygons)),
         ("tints", to_bytes(&scene.tints)),
         ("texels", scene.textures.iter().flat_map(|texture| texture.texels.as_flattened()).copied().collect()),
+        ("environment", to_bytes(map_of(scene.environment.as_ref()))),
         ("vertices", to_bytes(&baked.vertices)),
         ("samples", to_bytes(&baked.samples)),
         ("triangles", to_bytes(&baked.triangles)),
@@ -117,6 +124,7 @@ fn write(path: &Path, baked: &Baked, unfinished: Option<&Unfinished>) -> Result<
         objects: scene.objects.clone(),
         cameras: scene.cameras.clone(),
         lights: scene.lights.clone(),
+        environment: scene.environment.as_ref().map(|environment| with_texels(environment, Vec::new())),
         sections: sections.collect(),
     };
     let too_large = || FormatError::content(path, "the bake's names and options fill a gigabyte", "shorten the names");
@@ -211,6 +219,10 @@ pub fn read_unfinished(path: &Path) -> Result<(Baked, Option<Unfinished>), Forma
             objects: header.objects,
             cameras: header.cameras,
             lights: header.lights,
+            environment: match &header.environment {
+                Some(environment) => Some(with_texels(environment, sections.rows("environment")?)),
+                None => None,
+            },
         },
         vertices: sections.rows("vertices")?,
         samples: sections.rows("samples")?,
@@ -240,6 +252,23 @@ fn textures(sizes: Vec<(String, u32, u32)>, mut texels: &[[u8; 3]]) -> Option<Ve
         textures.push(Texture { name, width, height, texels: texels.split_off(..count)?.to_vec() });
     }
     texels.is_empty().then_some(textures)
+}
+
+/// The texels of an environment's map; none where it has no map.
+fn map_of(environment: Option<&Environment>) -> &[Vec3] {
+    match environment.map(|environment| &environment.sky) {
+        Some(Sky::Map(map)) => &map.texels,
+        _ => &[],
+    }
+}
+
+/// The same environment with other texels, where it has a map.
+fn with_texels(environment: &Environment, texels: Vec<Vec3>) -> Environment {
+    let sky = match environment.sky {
+        Sky::Map(LatLongMap { width, height, .. }) => Sky::Map(LatLongMap { width, height, texels }),
+        Sky::Cie(sky) => Sky::Cie(sky),
+    };
+    Environment { sky, ..*environment }
 }
 
 /// The checked sections of a file.
@@ -286,10 +315,11 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use std::path::PathBuf;
 
-    use glam::{DVec3, Vec2, Vec3};
+    use glam::{DVec3, Vec2};
     use proptest::prelude::*;
     use scene::{
         Answers, BakedElement, BakedTriangle, Camera, DiscontinuityLine, EdgeKind, Gloss, LineKind, Polygon, Rgb, Seen,
+        UpAxis,
     };
 
     use super::*;
@@ -327,6 +357,12 @@ mod tests {
                     Light::Point { position: DVec3::ONE, intensity: Rgb::Y },
                     Light::Directional { direction: DVec3::Z, irradiance: Rgb::ONE },
                 ],
+                environment: Some(Environment {
+                    sky: Sky::Map(LatLongMap { width: 2, height: 1, texels: vec![Vec3::ONE, Vec3::X] }),
+                    up: UpAxis::Y,
+                    rotation: 0.5,
+                    scale: 2.0,
+                }),
             },
             vertices: corners.map(|corner| corner.as_vec3()).to_vec(),
             samples: (0..6).map(|i| Vec3::splat(i as f32 * 0.1)).collect(),

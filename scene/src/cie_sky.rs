@@ -46,11 +46,17 @@ impl CieSky {
     /// horizon, 0..=π/2), which by itself sends so much to a surface that faces it, W·m⁻². None if a number is out of its
     /// range.
     pub fn new(kind: u8, [azimuth, altitude]: [f64; 2], sun_irradiance: f64) -> Option<Self> {
-        let within = (1..=CIE_SKIES).contains(&kind)
+        let sky = Self { kind, sun: [azimuth, altitude], sun_irradiance };
+        sky.is_valid().then_some(sky)
+    }
+
+    /// Whether every number is in its range; one that was read from a file may not be.
+    pub(crate) fn is_valid(&self) -> bool {
+        let [azimuth, altitude] = self.sun;
+        (1..=CIE_SKIES).contains(&self.kind)
             && azimuth.is_finite()
             && (0.0..=FRAC_PI_2).contains(&altitude)
-            && (0.0..f64::INFINITY).contains(&sun_irradiance);
-        within.then_some(Self { kind, sun: [azimuth, altitude], sun_irradiance })
+            && (0.0..f64::INFINITY).contains(&self.sun_irradiance)
     }
 
     /// Where the sun stands: radians clockwise from north, and above the horizon.

@@ -7,11 +7,12 @@
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use glam::{DVec3, Vec3};
+use serde::{Deserialize, Serialize};
 
 use crate::{CieSky, Rgb};
 
 /// The axis of the scene that points up in an environment.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum UpAxis {
     /// East is y, north z.
     X,
@@ -46,7 +47,7 @@ impl UpAxis {
 }
 
 /// A picture of all directions, row by row from the zenith.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LatLongMap {
     /// Columns.
     pub width: u32,
@@ -57,7 +58,7 @@ pub struct LatLongMap {
 }
 
 /// Where an environment has its light from.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Sky {
     /// A picture.
     Map(LatLongMap),
@@ -66,7 +67,7 @@ pub enum Sky {
 }
 
 /// Light that arrives from all directions, the same at every place.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Environment {
     /// The light itself.
     pub sky: Sky,
@@ -79,6 +80,20 @@ pub struct Environment {
 }
 
 impl Environment {
+    /// Whether every number is finite and in its range, and a map has as many texels as it says.
+    pub fn is_valid(&self) -> bool {
+        let is_sky = match &self.sky {
+            Sky::Map(LatLongMap { width, height, texels }) => {
+                let sound = |texel: &Vec3| texel.is_finite() && texel.min_element() >= 0.0;
+                u64::from(*width) * u64::from(*height) == texels.len() as u64
+                    && !texels.is_empty()
+                    && texels.iter().all(sound)
+            }
+            Sky::Cie(sky) => sky.is_valid(),
+        };
+        is_sky && self.rotation.is_finite() && self.scale.is_finite() && self.scale >= 0.0
+    }
+
     /// The unit direction of a place in the picture.
     pub fn direction(&self, u: f64, v: f64) -> DVec3 {
         let azimuth = (u - 0.5) * TAU + self.rotation;
@@ -175,6 +190,21 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn what_is_no_light_is_not_valid() {
+        let sound = map(2, 1);
+        assert!(sound.is_valid());
+        assert!(!Environment { scale: f64::NAN, ..sound.clone() }.is_valid());
+        assert!(!Environment { scale: -1.0, ..sound.clone() }.is_valid());
+        assert!(!Environment { rotation: f64::INFINITY, ..sound.clone() }.is_valid());
+        for texels in [vec![], vec![Vec3::ONE], vec![Vec3::NAN; 2], vec![Vec3::NEG_ONE; 2]] {
+            let sky = Sky::Map(LatLongMap { width: 2, height: 1, texels });
+            assert!(!Environment { sky, ..sound.clone() }.is_valid());
+        }
+        let empty = Sky::Map(LatLongMap { width: 0, height: 3, texels: vec![] });
+        assert!(!Environment { sky: empty, ..sound }.is_valid());
     }
 
     #[test]

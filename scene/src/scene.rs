@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use glam::{DVec3, Vec2, Vec3};
 use serde::{Deserialize, Serialize};
 
-use crate::{Gloss, Light, Material, NamedCamera, Plane, Polygon, Rgb, Texture, area_vector};
+use crate::{Environment, Gloss, Light, Material, NamedCamera, Plane, Polygon, Rgb, Texture, area_vector};
 
 /// Largest coordinate accepted, metres. Beyond it f32 positions in a viewer would be off by more than a
 /// centimetre, and nobody models a room there on purpose: the units are wrong.
@@ -38,6 +38,8 @@ pub struct Scene {
     pub cameras: Vec<NamedCamera>,
     /// Lights that are no surfaces; bakes know none of them.
     pub lights: Vec<Light>,
+    /// The light that comes from far away where nothing stands, if any does.
+    pub environment: Option<Environment>,
 }
 
 /// What is wrong with a scene as data.
@@ -168,6 +170,9 @@ impl Scene {
             if !named.camera.is_valid() {
                 return Err(SceneError::Number(format!("camera {}", named.name)));
             }
+        }
+        if self.environment.as_ref().is_some_and(|environment| !environment.is_valid()) {
+            return Err(SceneError::Number("the environment".into()));
         }
         match self.lights.iter().position(|light| !light.is_valid()) {
             Some(i) => Err(SceneError::Number(format!("light {i}"))),
