@@ -7,7 +7,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use glam::{DVec2, DVec3};
 use scene::{Baked, Bvh, Rgb, Scene, centroid};
-use solver::{Contribution, ElementLight, Gather, NodeId, Solution, SolveOptions, colour_slope};
+use solver::{Contribution, ElementLight, Gather, NodeId, Sender, Solution, SolveOptions, colour_slope};
 use viewer::{LightSource, SurfacePoint};
 
 use crate::pipeline;
@@ -95,9 +95,12 @@ fn element_light(baked: &Baked, bvh: &Bvh, solution: &Solution, leaf: NodeId, re
 /// A contribution as a user calls it.
 fn light_source(scene: &Scene, contribution: Contribution) -> LightSource {
     let irradiance = contribution.irradiance();
-    let Some(polygon) = contribution.polygon else {
-        let (name, blockers) = ("faint lamps together".to_owned(), Vec::new());
-        return LightSource { name, emits: true, irradiance, middle: None, blockers };
+    let without_surface =
+        |name: &str| LightSource { name: name.to_owned(), emits: true, irradiance, middle: None, blockers: Vec::new() };
+    let polygon = match contribution.sender {
+        Sender::Polygon(polygon) => polygon,
+        Sender::FaintEmitters => return without_surface("faint lamps together"),
+        Sender::Sky => return without_surface("sky"),
     };
     let material = &scene.material(polygon).name;
     let object = &scene.objects[scene.polygons[polygon as usize].object as usize];

@@ -7,14 +7,26 @@ use scene::{Rgb, luminance};
 
 use crate::leaf_gather::{LeafGather, SeenNode, Source};
 use crate::ray_gather::View;
+use crate::sky_view::SkyView;
 use crate::{Cosine, Gather};
+
+/// Who sends light to a point.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Sender {
+    /// A polygon; the first face of a convex body that emits.
+    Polygon(u32),
+    /// All emitters together that are too faint there to be told apart, as there are in scenes without links.
+    #[default]
+    FaintEmitters,
+    /// The sky.
+    Sky,
+}
 
 /// The light of one source at a point.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Contribution {
-    /// The source; the first of its faces where it is a convex body. None stands for all emitters together that are too faint
-    /// there to be told apart, as there are in scenes without links.
-    pub polygon: Option<u32>,
+    /// The source.
+    pub sender: Sender,
     /// Irradiance at the point by what the source emits, W·m⁻².
     pub emitted: Rgb,
     /// Irradiance at the point by what it reflects, W·m⁻².
@@ -36,28 +48,32 @@ impl Gather<'_> {
     pub fn contributions_at(&self, polygon: u32, position: DVec3, inward: DVec3) -> Vec<Contribution> {
         let Some(leaf) = self.leaf_under(polygon, position, DVec3::ZERO, inward) else { return Vec::new() };
         let leaf = self.over(leaf);
-        let mut found: BTreeMap<Option<u32>, Contribution> = BTreeMap::new();
-        let emitted_by = |sources: Vec<Source>, groups: Vec<u32>| {
-            let alone = LeafGather { sources, groups, view: View::default(), blockers: leaf.blockers.clone(), ..leaf };
+        let mut found: BTreeMap<Sender, Contribution> = BTreeMap::new();
+        let LeafGather { gather, polygon, centre, .. } = leaf;
+        let emitted_by = |sources: Vec<Source>, groups: Vec<u32>, sky: SkyView| {
+            let (view, blockers) = (View::default(), leaf.blockers.clone());
+            let alone = LeafGather { gather, polygon, centre, sources, groups, view, sky, blockers };
             alone.emitted(position, inward, Cosine::Shading)
         };
         for source in &leaf.sources {
-            let entry = found.entry(Some(source.polygon)).or_default();
+            let entry = found.entry(Sender::Polygon(source.polygon)).or_default();
             entry.blockers.extend(source.blockers.iter().flatten());
             if self.scene.material(source.polygon).emits() {
-                entry.emitted += emitted_by(vec![source.clone()], Vec::new());
+                entry.emitted += emitted_by(vec![source.clone()], Vec::new(), SkyView::default());
             }
         }
-        found.entry(None).or_default().emitted = emitted_by(Vec::new(), leaf.groups.clone());
+        let faint = emitted_by(Vec::new(), leaf.groups.clone(), SkyView::default());
+        found.entry(Sender::FaintEmitters).or_default().emitted = faint;
+        found.entry(Sender::Sky).or_default().emitted = emitted_by(Vec::new(), Vec::new(), leaf.sky.clone());
         let mut seen = Vec::new();
         leaf.seen_nodes(position, inward, Cosine::Shading, &mut seen);
-        let polygon_of = |seen: &SeenNode| self.solution.elements.polygon_of(seen.node);
+        let sender = |seen: &SeenNode| self.solution.elements.polygon_of(seen.node).map(Sender::Polygon);
         for node in &seen {
-            found.entry(polygon_of(node)).or_default().reflected += self.irradiance_from(&[*node]);
+            found.entry(sender(node).unwrap_or_default()).or_default().reflected += self.irradiance_from(&[*node]);
         }
         let mut contributions: Vec<Contribution> = found
             .into_iter()
-            .map(|(polygon, contribution)| Contribution { polygon, ..contribution })
+            .map(|(sender, contribution)| Contribution { sender, ..contribution })
             .filter(|contribution| contribution.irradiance() != Rgb::ZERO)
             .collect();
         for contribution in &mut contributions {
@@ -111,9 +127,9 @@ mod tests {
             assert!(strengths.iter().all(|&strength| strength > 0.0));
         }
         // Beside the plate's shadow the bright lamp is the first; within, the plate may hide it.
-        assert_eq!(gather.contributions_at(0, DVec3::new(-1.0, 0.7, 0.0), DVec3::X)[0].polygon, Some(3));
+        assert_eq!(gather.contributions_at(0, DVec3::new(-1.0, 0.7, 0.0), DVec3::X)[0].sender, Sender::Polygon(3));
         let parts = gather.contributions_at(0, DVec3::new(0.1, 0.2, 0.0), DVec3::X);
-        let lamp = parts.iter().find(|part| part.polygon == Some(3)).expect("some of the lamp is seen");
+        let lamp = parts.iter().find(|part| part.sender == Sender::Polygon(3)).expect("some of the lamp is seen");
         assert_eq!(lamp.reflected, Rgb::ZERO);
         assert!(lamp.blockers.contains(&1) || lamp.blockers.contains(&2), "{:?}", lamp.blockers);
     }

@@ -34,6 +34,17 @@ pub fn point_form_factor(directions: &[DVec3], normal: DVec3) -> f64 {
     fraction(edges(directions).map(|[from, to]| edge_term(from, to, normal)).sum())
 }
 
+/// What the unit normal of a surface is multiplied by for the form factor to a convex cone of directions, all of which are above
+/// the surface. The corners run counter-clockwise seen from the surface.
+pub fn form_vector(directions: &[DVec3]) -> DVec3 {
+    let term = |[from, to]: [DVec3; 2]| {
+        let across = to.cross(from);
+        let sine = across.length();
+        if sine > 0.0 { across * (sine.atan2(from.dot(to)) / sine) } else { DVec3::ZERO }
+    };
+    edges(directions).map(term).sum::<DVec3>() / std::f64::consts::TAU
+}
+
 /// Form factor from a surface element at `position` (metres) with the unit vector `normal` to a convex polygon, 0..=1.
 /// The polygon is clipped by the element's horizon and seen from either side.
 pub fn form_factor_at(position: DVec3, normal: DVec3, outline: &[DVec3]) -> f64 {

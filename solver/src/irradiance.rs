@@ -22,6 +22,7 @@ use crate::light_tree::{Horizon, LightTree};
 use crate::polygon_tree::PolygonTree;
 use crate::ray_gather::{RayGather, View, rays_for};
 use crate::shafts::Shafts;
+use crate::sky_view::SkyView;
 use crate::solid::Solids;
 use crate::solution::{Solution, Visibility};
 use crate::{LinkSource, NodeId};
@@ -247,6 +248,7 @@ impl<'a> Gather<'a> {
                     sources: Vec::new(),
                     groups: Vec::new(),
                     view: self.rays().map(view).unwrap_or_default(),
+                    sky: SkyView::default(),
                     blockers: Vec::new(),
                 }
             }
@@ -340,7 +342,16 @@ impl<'a> Gather<'a> {
         blockers.dedup();
         let polygon = elements.polygon_of(element).unwrap_or_default();
         let centre = elements.nodes[element as usize].centre;
-        LeafGather { gather: self, polygon, centre, sources, groups: Vec::new(), view: View::default(), blockers }
+        LeafGather {
+            gather: self,
+            polygon,
+            centre,
+            sources,
+            groups: Vec::new(),
+            view: View::default(),
+            sky: SkyView::default(),
+            blockers,
+        }
     }
 
     /// A source polygon by all links from it.

@@ -20,6 +20,7 @@ use crate::clip::clip_convex;
 use crate::emitter::outline_of;
 use crate::form_factor::point_form_factor;
 use crate::ray_gather::View;
+use crate::sky_view::SkyView;
 use crate::{Cosine, Gather, NodeId};
 
 /// The part of a source's form factor from which on nothing is taken to hide it: above the rounding of its clipping.
@@ -31,7 +32,7 @@ const CURVATURE: f64 = 2.0;
 
 /// Obstacles before a source at most that are projected one by one, in a scene of too many polygons for links; past more,
 /// rays tell what is seen of it. Less leaves penumbrae to rays that exact ones would be had for.
-const MOST_OBSTACLES: usize = 24;
+pub(crate) const MOST_OBSTACLES: usize = 24;
 
 /// Six points that integrate a polynomial of degree 4 over a triangle: weights, and barycentrics of which the second counts
 /// twice (Dunavant, "High Degree Efficient Symmetrical Gaussian Quadrature Rules for the Triangle", 1985). A point a
@@ -52,6 +53,8 @@ pub struct LeafGather<'a> {
     pub(crate) groups: Vec<u32>,
     /// How its points look at reflectors, in a scene without links.
     pub(crate) view: View,
+    /// What its points may see of the sky.
+    pub(crate) sky: SkyView,
     /// All blockers of all sources, ascending.
     pub(crate) blockers: Vec<u32>,
 }
@@ -89,10 +92,14 @@ impl Source {
             None => gather.geometry.outline(self.polygon),
         }
     }
+
+    fn blockers(&self) -> &[u32] {
+        self.blockers.as_deref().unwrap_or_default()
+    }
 }
 
 /// What obstacles hide from one point, as far as it has been asked: no cone where one hides nothing, or a solid has none.
-struct Cones {
+pub(crate) struct Cones {
     of_solids: HashMap<u32, Option<BlockerCone>>,
     /// By number among the leaf's blockers.
     of_faces: Vec<Option<Option<BlockerCone>>>,
@@ -151,21 +158,21 @@ impl LeafGather<'_> {
         }
     }
 
-    /// What may hide a source: its blockers in front of it, gathered to solids where all of a solid is.
-    fn before(&self, source: &Source) -> Vec<Obstacle> {
+    /// What may hide a source in a plane, its front towards the element: blockers before it, gathered to solids where all of a
+    /// solid is.
+    pub(crate) fn before(&self, plane: &Plane, blockers: &[u32]) -> Vec<Obstacle> {
         let Gather { scene, geometry, solids, .. } = self.gather;
-        let plane = self.plane(source);
         let mut obstacles: Vec<Obstacle> = Vec::new();
-        for &polygon in source.blockers.iter().flatten() {
+        for &polygon in blockers {
             let number = self.blockers.partition_point(|&other| other < polygon);
-            let Some(blocker) = Blocker::before(geometry, &plane, polygon) else { continue };
+            let Some(blocker) = Blocker::before(geometry, plane, polygon) else { continue };
             let known = |solid: u32| obstacles.iter().position(|obstacle| obstacle.solid == Some(solid));
             let solid = solids.of_polygon(polygon);
             if let Some(place) = solid.and_then(known) {
                 obstacles[place].faces.push((number, blocker));
                 continue;
             }
-            let whole = |&solid: &u32| solids.is_before(scene, solid, &plane, geometry.contact_tolerance);
+            let whole = |&solid: &u32| solids.is_before(scene, solid, plane, geometry.contact_tolerance);
             obstacles.push(Obstacle { solid: solid.filter(whole), faces: vec![(number, blocker)] });
         }
         obstacles
@@ -198,7 +205,7 @@ impl LeafGather<'_> {
             return faces.map(|&face| from.form_factor(geometry.outline(face))).sum();
         };
         fragments.start(cone.corners(), from);
-        let obstacles = source.before.get_or_init(|| self.before(source));
+        let obstacles = source.before.get_or_init(|| self.before(&self.plane(source), source.blockers()));
         if source.blockers.is_none() || obstacles.len() > MOST_OBSTACLES {
             let unoccluded = fragments.measure(from.normal);
             let distance = emitter.body[0].distance(from.position);
@@ -217,7 +224,7 @@ impl LeafGather<'_> {
     }
 
     /// Cuts away what an obstacle hides from a point. `cones` are those that the point has needed so far, by number.
-    fn subtract(&self, obstacle: &Obstacle, from: &Viewpoint, cones: &mut Cones, fragments: &mut Fragments) {
+    pub(crate) fn subtract(&self, obstacle: &Obstacle, from: &Viewpoint, cones: &mut Cones, fragments: &mut Fragments) {
         let Gather { scene, geometry, solids, .. } = self.gather;
         if let Some(solid) = obstacle.solid {
             let cone = cones.of_solids.entry(solid).or_insert_with(|| solids.cone(scene, geometry, solid, from));
@@ -285,7 +292,7 @@ impl LeafGather<'_> {
             } else {
                 continue;
             }
-            let obstacles = source.before.get_or_init(|| self.before(source));
+            let obstacles = source.before.get_or_init(|| self.before(&self.plane(source), source.blockers()));
             let by_rays = source.blockers.is_none();
             if (by_rays || !obstacles.is_empty()) && !touches && gather.emitter_tree().is_some() {
                 let unoccluded = fragments.measure(from.normal);
@@ -317,6 +324,7 @@ impl LeafGather<'_> {
             }
         }
         if wanted != Light::Reflected {
+            total += self.light_of_sky(&from, &mut cones, &mut fragments);
             total += self.light_of_faint_groups(&from);
         }
         total

@@ -26,6 +26,8 @@ mod quadrature;
 mod ray_gather;
 mod refine;
 mod shafts;
+mod sky_cells;
+mod sky_view;
 mod solid;
 mod solution;
 mod solve;
@@ -35,7 +37,7 @@ mod transport;
 mod validate;
 mod visibility;
 
-pub use contribution::Contribution;
+pub use contribution::{Contribution, Sender};
 pub use cut::{contact_lines, cut_polygon};
 pub use element::{Elements, Node, NodeId, NodeKind, Patch};
 pub use form_factor::{exchange, form_factor, form_factor_at, point_form_factor};
@@ -44,6 +46,7 @@ pub use lattice::{Fan, hemisphere, spread};
 pub use leaf_gather::{LeafGather, SeenNode};
 pub use linear_fit::colour_slope;
 pub use shafts::Shafts;
+pub use sky_cells::{SkyCell, SkyCells};
 pub use solution::{
     BlockerLists, Convergence, Cut, ElementLight, Interaction, Link, LinkSource, Solution, SolveOptions, Visibility,
 };

@@ -3,7 +3,7 @@
 use std::cell::Cell;
 
 use glam::DVec3;
-use scene::{Bvh, Scene, other_sides};
+use scene::{Bvh, Ray, Scene, other_sides};
 
 use crate::geometry::Geometry;
 use crate::visibility::{Occlusion, Shaft};
@@ -22,9 +22,6 @@ pub enum Stands {
 /// Polygons whose boxes reach into a shaft, at most, that are looked at one by one. Behind more, rays will tell what is seen
 /// in any case.
 const MOST_CANDIDATES: usize = 160;
-
-/// Triangles of such polygons at most that are counted: two for each.
-const MOST_TRIANGLES: usize = 2 * MOST_CANDIDATES;
 
 /// A bounding volume hierarchy over the polygons of a scene.
 pub struct PolygonTree {
@@ -53,30 +50,47 @@ impl PolygonTree {
 
     /// What stands in a shaft.
     pub fn in_shaft(&self, geometry: &Geometry, shaft: &Shaft<'_>) -> Stands {
+        self.few_in_shaft(geometry, shaft, MOST_CANDIDATES)
+    }
+
+    /// The same where more than so many that may stand there are many: a quick look.
+    pub fn few_in_shaft(&self, geometry: &Geometry, shaft: &Shaft<'_>, most: usize) -> Stands {
         let mut found = Vec::new();
         let entered = Cell::new(0);
+        // Two for each polygon.
+        let most_triangles = 2 * most;
         self.bvh.within(
-            |low, high| entered.get() <= MOST_TRIANGLES && shaft.may_enter(low, high),
+            |low, high| entered.get() <= most_triangles && shaft.may_enter(low, high),
             |polygon| {
                 found.push(polygon);
                 entered.set(found.len());
             },
         );
-        if entered.get() > MOST_TRIANGLES {
+        if entered.get() > most_triangles {
             return Stands::Many;
         }
         found.sort_unstable();
         found.dedup();
-        if found.len() > MOST_CANDIDATES {
+        if found.len() > most {
             return Stands::Many;
         }
+        Self::narrowed(geometry, shaft, found)
+    }
+
+    /// What of some polygons, which ascend, stands in a shaft.
+    pub fn narrowed(geometry: &Geometry, shaft: &Shaft<'_>, mut polygons: Vec<u32>) -> Stands {
         let mut is_total = false;
-        found.retain(|&polygon| {
+        polygons.retain(|&polygon| {
             let occlusion = shaft.classify(geometry.outline(polygon));
             is_total |= occlusion == Occlusion::Total;
             occlusion != Occlusion::Clear
         });
-        if is_total { Stands::All } else { Stands::Some(found) }
+        if is_total { Stands::All } else { Stands::Some(polygons) }
+    }
+
+    /// The nearest polygon that a ray meets, apart from the one that it starts on and its other side.
+    pub fn first_met(&self, polygon: u32, origin: DVec3, direction: DVec3) -> Option<u32> {
+        self.bvh.closest_hit_among(&Ray { origin, direction }, |other| !self.is_own(polygon, other)).map(|hit| hit.id)
     }
 
     /// Whether a polygon stands between a point of a polygon and another point, apart from the polygon, its other side, and

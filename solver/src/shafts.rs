@@ -112,11 +112,17 @@ impl<'a> Gather<'a> {
             let polygon = emitter.polygons[0];
             sources.push(Source { polygon, body, roots: Vec::new(), part: None, blockers, before: OnceCell::new() });
         }
-        let mut blockers: Vec<u32> =
-            sources.iter().filter_map(|source| source.blockers.as_ref()).flatten().copied().collect();
+        let sky = self.over_sky(element, &horizon);
+        let mut blockers: Vec<u32> = sources
+            .iter()
+            .filter_map(|source| source.blockers.as_ref())
+            .flatten()
+            .chain(sky.blockers())
+            .copied()
+            .collect();
         blockers.sort_unstable();
         blockers.dedup();
-        LeafGather { gather: self, polygon, centre, sources, groups: cut.groups, view: View::default(), blockers }
+        LeafGather { gather: self, polygon, centre, sources, groups: cut.groups, view: View::default(), sky, blockers }
     }
 
     /// What stands in the shaft between an emitter and an element.

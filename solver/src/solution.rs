@@ -5,7 +5,7 @@ use scene::{Rgb, Scene, luminance};
 use serde::{Deserialize, Serialize};
 
 use crate::linear_fit::fit_inner_nodes;
-use crate::{Elements, NodeId};
+use crate::{Elements, NodeId, SkyCells};
 
 /// What a solve is asked for.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -27,7 +27,7 @@ pub enum Visibility {
     Rays,
 }
 
-/// Where the light of a link comes from. Parts of the sky will stand beside nodes here.
+/// Where the light of a link comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum LinkSource {
     /// Another node of the hierarchy.
@@ -166,6 +166,8 @@ pub struct Solution {
     pub bounces: Option<u32>,
     /// How points find what they see.
     pub visibility: Visibility,
+    /// The sky, if the scene has one.
+    pub sky: SkyCells,
 }
 
 impl Solution {

@@ -5,8 +5,9 @@ use scene::{Rgb, Scene, luminance};
 
 use crate::cut::{contact_lines, cut_polygon};
 use crate::refine::{Network, SourceLight};
+use crate::sky_view::mean_irradiance_from_sky;
 use crate::transport::{Transport, transport};
-use crate::{BlockerLists, Convergence, Cut, ElementLight, Elements, Solution, SolveOptions, Visibility};
+use crate::{BlockerLists, Convergence, Cut, ElementLight, Elements, SkyCells, Solution, SolveOptions, Visibility};
 
 /// Link error as a fraction of the scene's mean irradiance where none is asked for. Half of it costs the
 /// office half as many elements again.
@@ -42,7 +43,7 @@ pub fn solve(scene: &Scene, options: &SolveOptions, progress: &(dyn Fn(f64) + Sy
     for pieces in &pieces {
         first_patch.push(first_patch.last().unwrap_or(&0) + pieces.len() as u32);
     }
-    if scene.polygons.len() > MOST_LINKED {
+    if scene.polygons.len() > MOST_LINKED || scene.environment.is_some() {
         progress(1.0);
         return unlinked(scene, &pieces, cuts, first_patch, options);
     }
@@ -85,6 +86,7 @@ pub fn solve(scene: &Scene, options: &SolveOptions, progress: &(dyn Fn(f64) + Sy
         link_error,
         bounces: options.bounces,
         visibility: Visibility::Links,
+        sky: SkyCells::default(),
     }
 }
 
@@ -99,6 +101,7 @@ fn unlinked(
     let mut elements = Elements::new(pieces);
     elements.divide_larger((scene.surface_area() * LARGEST_SHARE).sqrt().min(scene.size() * LARGEST_CELL));
     let dark = vec![ElementLight::default(); elements.nodes.len()];
+    let sky = SkyCells::new(scene.environment.as_ref());
     Solution {
         first_link: vec![0; elements.nodes.len() + 1],
         elements,
@@ -114,18 +117,20 @@ fn unlinked(
         link_error: 0.0,
         bounces: options.bounces,
         visibility: Visibility::Rays,
+        sky,
     }
 }
 
-/// Mean irradiance of a closed room with the scene's lamps and walls, W·m⁻²: light that escapes, and lamps that shine where few
-/// surfaces are, make it less.
+/// Mean irradiance of a closed room with the scene's lamps and walls, and as much light from the sky as arrives, W·m⁻²: light
+/// that escapes, and lamps that shine where few surfaces are, make it less.
 fn guessed_irradiance(scene: &Scene) -> Rgb {
     let sum =
         |of: &dyn Fn(u32) -> Rgb| scene.polygon_ids().map(|polygon| of(polygon) * scene.area(polygon)).sum::<Rgb>();
     let area = sum(&|_| Rgb::ONE);
     let emitted = sum(&|polygon| scene.material(polygon).exitance());
+    let from_sky = mean_irradiance_from_sky(scene) * area;
     let absorbed = sum(&|polygon| Rgb::ONE - scene.reflectance(polygon));
-    if area.x > 0.0 { emitted / absorbed.max(area * LEAST_ABSORBED) } else { Rgb::ZERO }
+    if area.x > 0.0 { (emitted + from_sky) / absorbed.max(area * LEAST_ABSORBED) } else { Rgb::ZERO }
 }
 
 /// What refinement goes by: radiosity as a source, and how far it varies below each node.

@@ -49,7 +49,18 @@ impl<'a> Shaft<'a> {
         let corners = || a.iter().chain(b).copied();
         let (low, high) =
             (corners().fold(DVec3::INFINITY, DVec3::min), corners().fold(DVec3::NEG_INFINITY, DVec3::max));
-        let tolerance = TOUCH * (high - low).length();
+        Self::within(a, b, TOUCH * (high - low).length())
+    }
+
+    /// The same where only what blockers do to it that fit into `size` metres counts: for an end that is far away from all of them.
+    pub fn between_far(a: &'a [DVec3], b: &'a [DVec3], size: f64) -> Self {
+        Self::within(a, b, TOUCH * size)
+    }
+
+    fn within(a: &'a [DVec3], b: &'a [DVec3], tolerance: f64) -> Self {
+        let corners = || a.iter().chain(b).copied();
+        let (low, high) =
+            (corners().fold(DVec3::INFINITY, DVec3::min), corners().fold(DVec3::NEG_INFINITY, DVec3::max));
         let mut shaft = Self { ends: [a, b], planes: Vec::with_capacity(a.len() + b.len() + 2), low, high, tolerance };
         shaft.planes.extend([a, b].map(Plane::through).into_iter().filter(|front| front.normal != DVec3::ZERO));
         for (near, far) in [(a, b), (b, a)] {
