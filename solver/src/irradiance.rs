@@ -148,6 +148,11 @@ impl<'a> Gather<'a> {
         self.emitter_tree.as_ref()
     }
 
+    /// Rays from a point to the sky, where they tell what is seen of it, and their turn.
+    pub(crate) fn sampling(&self) -> (u32, u32) {
+        self.sampling
+    }
+
     /// Rays over the solution's elements, where they stand in for links.
     pub(crate) fn rays(&self) -> Option<&RayGather> {
         let by_rays = self.solution.visibility == Visibility::Rays && self.solution.reflects();

@@ -20,6 +20,7 @@ mod lattice;
 mod leaf_gather;
 mod light_tree;
 mod linear_fit;
+mod openings;
 mod oracle;
 mod polygon_tree;
 mod quadrature;
@@ -45,6 +46,7 @@ pub use irradiance::{Contact, Cosine, Gather};
 pub use lattice::{Fan, hemisphere, spread};
 pub use leaf_gather::{LeafGather, SeenNode};
 pub use linear_fit::colour_slope;
+pub use openings::{Openings, SeenCell};
 pub use shafts::Shafts;
 pub use sky_cells::{SkyCell, SkyCells};
 pub use solution::{

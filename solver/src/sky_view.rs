@@ -10,28 +10,38 @@ use std::cell::OnceCell;
 use std::f64::consts::PI;
 
 use glam::{DVec2, DVec3};
-use scene::{Bvh, Plane, Rgb, Scene, luminance};
+use scene::{Plane, Rgb, Scene, luminance};
 
 use crate::Gather;
-use crate::backprojection::{Fragments, Viewpoint};
+use crate::backprojection::{Fragments, SLIVER, Viewpoint};
 use crate::clip::clip_convex;
-use crate::lattice::{Fan, hemisphere, spread};
-use crate::leaf_gather::{Cones, LeafGather, MOST_OBSTACLES, Obstacle};
+use crate::form_factor::point_form_factor;
+use crate::lattice::{Fan, STEP, hemisphere, shift, spread};
+use crate::leaf_gather::{Cones, LeafGather, Obstacle};
 use crate::light_tree::Horizon;
+use crate::openings::{BEYOND, SeenCell};
 use crate::polygon_tree::{PolygonTree, Stands};
+use crate::ray_gather::ASIDE;
 use crate::visibility::{Occlusion, Shaft};
-use crate::{NodeId, SkyCell, SkyCells};
+use crate::{NodeId, SkyCell, Solution};
 
 /// How far away the sky is taken to be where a shaft leads to it, in sizes of the scene: what a parallax of a millionth may
 /// hide is less than what welding moves.
 const FAR: f64 = 1e6;
 
-/// How far rays to the sky go, in sizes of the scene: nothing stands beyond.
-const BEYOND: f64 = 2.0;
+/// Polygons before a cell with parts, at most, for which all of it is looked at at once: what is seen of it is then cut along its
+/// parts. More has every point project what hides nothing of most parts, less has it look at more cells.
+const FEW: usize = 12;
 
-/// Polygons that stand before a cell that has parts, at most, for the parts to be told which. More are looked for anew by every
-/// part; less finds out more often what is known.
-const MOST_INHERITED: usize = 24;
+/// Polygons before a cell that has parts, at most, for the parts to be told which. More are looked for anew by every part.
+const MOST_INHERITED: usize = 48;
+
+/// Length of patches, as a part of the scene's size, that have no shafts to the sky in a scene of very many polygons: there are
+/// too many of them, and each is looked at once.
+const SHORT: f64 = 0.01;
+
+/// What is taken to be unsure at least of a cell that all or no places see. Less lets rays miss what they were not told of.
+const UNSURE: f64 = 0.15;
 
 /// Rays that tell how much light comes in where nothing is known.
 const GUESSING_RAYS: u32 = 4096;
@@ -43,14 +53,16 @@ pub(crate) struct SkyView {
     clear: [DVec3; 3],
     /// Cells that points may see some of.
     cells: Vec<DoubtfulCell>,
+    /// Cells without parts that rays tell of.
+    by_rays: Vec<SeenCell>,
 }
 
 /// A cell that something may stand before, or that the horizon cuts.
 #[derive(Clone)]
 struct DoubtfulCell {
     cell: u32,
-    /// Polygons that may stand before it, ascending; none if rays tell.
-    blockers: Option<Vec<u32>>,
+    /// Polygons that may stand before it, ascending.
+    blockers: Vec<u32>,
     /// The same as obstacles, once a point asks.
     before: OnceCell<Vec<Obstacle>>,
 }
@@ -58,7 +70,7 @@ struct DoubtfulCell {
 impl SkyView {
     /// Polygons that may stand before some cell.
     pub fn blockers(&self) -> impl Iterator<Item = &u32> {
-        self.cells.iter().filter_map(|cell| cell.blockers.as_ref()).flatten()
+        self.cells.iter().flat_map(|cell| &cell.blockers)
     }
 }
 
@@ -69,21 +81,28 @@ struct Look<'a> {
     outline: &'a [DVec3],
     centre: DVec3,
     horizon: &'a Horizon,
+    /// The cells that are seen from about there, ascending, where that is known.
+    seen: Option<&'a [SeenCell]>,
 }
 
 impl Gather<'_> {
     /// What the points of an element may see of the sky.
     pub(crate) fn over_sky(&self, element: NodeId, horizon: &Horizon) -> SkyView {
-        let elements = &self.solution.elements;
+        let Solution { elements, sky, openings, .. } = self.solution;
+        let centre = elements.nodes[element as usize].centre;
+        let seen = openings.as_ref().and_then(|openings| openings.from(centre));
         let mut view = SkyView::default();
-        let look = Look {
-            gather: self,
-            polygon: elements.polygon_of(element).unwrap_or_default(),
-            outline: elements.outline(element),
-            centre: elements.nodes[element as usize].centre,
-            horizon,
-        };
-        for cell in 0..self.solution.sky.roots {
+        if let Some(seen) = seen
+            && elements.cell_length(element) < SHORT * self.geometry.size
+        {
+            let up = horizon.plane.normal;
+            let rises = |seen: &&SeenCell| sky.cells[seen.cell as usize].corners.iter().any(|way| up.dot(*way) > 0.0);
+            view.by_rays = seen.iter().filter(rises).copied().collect();
+            return view;
+        }
+        let polygon = elements.polygon_of(element).unwrap_or_default();
+        let look = Look { gather: self, polygon, outline: elements.outline(element), centre, horizon, seen };
+        for cell in 0..sky.roots {
             look.at(cell, None, &mut view);
         }
         view
@@ -111,88 +130,141 @@ impl Look<'_> {
                 if met.is_some_and(|met| shaft.classify(geometry.outline(met)) == Occlusion::Total) {
                     return;
                 }
-                if parts.is_empty() {
-                    tree.in_shaft(geometry, &shaft)
-                } else {
-                    tree.few_in_shaft(geometry, &shaft, MOST_INHERITED)
-                }
+                tree.few_in_shaft(geometry, &shaft, MOST_INHERITED)
             }
         };
-        let blockers = match stands {
+        let mut polygons = match stands {
             Stands::All => return,
-            Stands::Many => None,
-            Stands::Some(mut polygons) => {
-                polygons.retain(|&polygon| polygon != self.polygon);
-                Some(polygons)
-            }
+            Stands::Many if parts.is_empty() => return view.by_rays.extend(self.seen(cell)),
+            Stands::Many => return parts.clone().for_each(|part| self.at(part, None, view)),
+            Stands::Some(polygons) => polygons,
         };
+        polygons.retain(|&polygon| polygon != self.polygon);
         let rises = |way: &DVec3| up.dot(*way) >= self.horizon.tilt.sin() * way.length();
-        if blockers.as_ref().is_some_and(Vec::is_empty) && corners.iter().all(rises) {
+        if polygons.is_empty() && corners.iter().all(rises) {
             (0..3).for_each(|colour| view.clear[colour] += light[colour]);
-        } else if parts.is_empty() {
-            view.cells.push(DoubtfulCell { cell, blockers, before: OnceCell::new() });
+        } else if parts.is_empty() || polygons.len() <= FEW {
+            view.cells.push(DoubtfulCell { cell, blockers: polygons, before: OnceCell::new() });
         } else {
-            parts.clone().for_each(|part| self.at(part, blockers.as_deref(), view));
+            parts.clone().for_each(|part| self.at(part, Some(&polygons), view));
         }
+    }
+
+    /// A cell that rays are to tell of; none where it is known that nothing is seen of it.
+    fn seen(&self, cell: u32) -> Option<SeenCell> {
+        let Some(seen) = self.seen else { return Some(SeenCell { cell, share: 0.5 }) };
+        seen.binary_search_by_key(&cell, |seen| seen.cell).ok().map(|place| seen[place])
     }
 }
 
 impl LeafGather<'_> {
     /// Irradiance from the sky at a point, W·m⁻². `cones` are those that the point has needed so far.
     pub(crate) fn light_of_sky(&self, from: &Viewpoint, cones: &mut Cones, fragments: &mut Fragments) -> Rgb {
-        let SkyCells { cells, .. } = &self.gather.solution.sky;
-        let clear = Rgb::from_array(self.sky.clear.map(|light| light.dot(from.normal)));
-        let seen = |doubtful: &DoubtfulCell| {
-            let cell = &cells[doubtful.cell as usize];
-            cell.exitance * self.seen_of_cell(cell, doubtful, from, cones, fragments)
-        };
-        clear + self.sky.cells.iter().map(seen).sum::<Rgb>()
+        let mut total = Rgb::from_array(self.sky.clear.map(|light| light.dot(from.normal)));
+        for doubtful in &self.sky.cells {
+            total += self.light_of_cell(doubtful, from, cones, fragments);
+        }
+        total + self.light_by_rays(from, fragments)
     }
 
-    /// Form factor of what a point sees of a cell.
-    fn seen_of_cell(
+    /// Irradiance from what a point sees of a cell, W·m⁻².
+    fn light_of_cell(
         &self,
-        cell: &SkyCell,
         doubtful: &DoubtfulCell,
         from: &Viewpoint,
         cones: &mut Cones,
         fragments: &mut Fragments,
-    ) -> f64 {
-        let geometry = &self.gather.geometry;
-        let reach = BEYOND * geometry.size;
-        let ways: Vec<DVec3> = cell.corners.iter().map(|way| way * reach).collect();
-        fragments.start(&ways, from);
+    ) -> Rgb {
+        let cell = &self.gather.solution.sky.cells[doubtful.cell as usize];
+        fragments.start(&cell.corners, from);
         if fragments.is_empty() {
-            return 0.0;
+            return Rgb::ZERO;
         }
         let obstacles = doubtful.before.get_or_init(|| {
             let axis = cell.corners.iter().sum::<DVec3>().normalize_or_zero();
-            let plane = Plane { normal: -axis, offset: -axis.dot(self.centre) - reach };
-            self.before(&plane, doubtful.blockers.as_deref().unwrap_or_default())
+            let reach = BEYOND * self.gather.geometry.size;
+            self.before(&Plane { normal: -axis, offset: -axis.dot(self.centre) - reach }, &doubtful.blockers)
         });
-        let by_rays = doubtful.blockers.is_none() || obstacles.len() > MOST_OBSTACLES;
-        if by_rays || !obstacles.is_empty() {
-            let unoccluded = fragments.measure(from.normal);
-            let irradiance = unoccluded * luminance(cell.exitance);
-            if by_rays || irradiance <= self.gather.budget() {
-                let outline: Vec<DVec3> = ways.iter().map(|way| from.position + *way).collect();
-                return unoccluded * self.seen_share(&outline, irradiance, from, |_| false);
-            }
-        }
         for obstacle in obstacles {
             if fragments.is_empty() {
-                return 0.0;
+                return Rgb::ZERO;
             }
             self.subtract(obstacle, from, cones, fragments);
         }
-        fragments.measure(from.normal)
+        fragments.measure(from.normal);
+        fragments.iter().map(|(fragment, factor)| self.light_of_fragment(doubtful.cell, fragment, factor, from)).sum()
+    }
+
+    /// Irradiance from a part of a cell, W·m⁻², given by its form factor; cut along the cell's parts.
+    fn light_of_fragment(&self, cell: u32, fragment: &[DVec3], form_factor: f64, from: &Viewpoint) -> Rgb {
+        let sky = &self.gather.solution.sky;
+        let SkyCell { exitance, parts, .. } = &sky.cells[cell as usize];
+        if form_factor <= SLIVER {
+            return Rgb::ZERO;
+        }
+        if parts.is_empty() {
+            return *exitance * form_factor;
+        }
+        let light_of_part = |part: u32| {
+            let corners = &sky.cells[part as usize].corners;
+            let mut rest = fragment.to_vec();
+            for (i, &corner) in corners.iter().enumerate() {
+                let inward = corners[(i + 1) % corners.len()].cross(corner);
+                if rest.iter().all(|way| inward.dot(*way) >= 0.0) {
+                    continue;
+                }
+                let mut kept = Vec::with_capacity(rest.len() + 1);
+                clip_convex(&rest, 0.0, |way| inward.dot(way), &mut kept);
+                if kept.is_empty() {
+                    return Rgb::ZERO;
+                }
+                rest = kept;
+            }
+            self.light_of_fragment(part, &rest, point_form_factor(&rest, from.normal), from)
+        };
+        parts.clone().map(light_of_part).sum()
+    }
+
+    /// Irradiance from the cells that rays tell of, W·m⁻².
+    fn light_by_rays(&self, from: &Viewpoint, fragments: &mut Fragments) -> Rgb {
+        let gather = self.gather;
+        let reach = BEYOND * gather.geometry.size;
+        let origin = from.aside(ASIDE * gather.geometry.size);
+        let (rays, turn) = gather.sampling();
+        let first = shift(from.position, turn);
+        let cells = || self.sky.by_rays.iter().map(|seen| (seen, &gather.solution.sky.cells[seen.cell as usize]));
+        let doubt = |(seen, cell): (&SeenCell, &SkyCell)| {
+            let most = Rgb::from_array(cell.light.map(|light| light.dot(from.normal).max(0.0)));
+            let share = f64::from(seen.share);
+            luminance(most) * (share * (1.0 - share)).sqrt().max(UNSURE)
+        };
+        let total: f64 = cells().map(doubt).sum();
+        if total <= 0.0 {
+            return Rgb::ZERO;
+        }
+        let rays = f64::from(rays) / total;
+        let light = |(number, (seen, cell)): (usize, (&SeenCell, &SkyCell))| {
+            fragments.start(&cell.corners, from);
+            let unoccluded = fragments.measure(from.normal);
+            if unoccluded == 0.0 {
+                return Rgb::ZERO;
+            }
+            let rays = (rays * doubt((seen, cell))).ceil().max(1.0) as u32;
+            let outline: Vec<DVec3> = cell.corners.iter().map(|way| origin.position + *way * reach).collect();
+            let is_blocked = |place| {
+                let passes = |polygon| !origin.may_meet(gather.geometry.outline(polygon));
+                gather.tree.is_blocked(self.polygon, origin.position, place, passes)
+            };
+            let shift = first + STEP * number as f64;
+            cell.exitance * (unoccluded * Fan::new(&outline).arriving(&origin, (shift, rays), is_blocked).share)
+        };
+        cells().enumerate().map(light).sum()
     }
 }
 
 /// Mean irradiance of all surfaces that comes straight from the sky, W·m⁻²: by rays from all over them.
-pub(crate) fn mean_irradiance_from_sky(scene: &Scene) -> Rgb {
+pub(crate) fn mean_irradiance_from_sky(scene: &Scene, tree: &PolygonTree) -> Rgb {
     let (Some(environment), area) = (&scene.environment, scene.surface_area()) else { return Rgb::ZERO };
-    let bvh = Bvh::of_scene(scene);
     let reach = BEYOND * scene.size();
     let (mut sum, mut before, mut polygons) = (Rgb::ZERO, 0.0, scene.polygon_ids());
     let mut next = polygons.next();
@@ -210,8 +282,7 @@ pub(crate) fn mean_irradiance_from_sky(scene: &Scene) -> Rgb {
         let normal = scene.plane(polygon).normal;
         let shift = spread(DVec2::ZERO, ray);
         let origin = Fan::new(&outline).place(shift, 0);
-        let is_free =
-            |direction: DVec3| !bvh.is_blocked_among(origin, origin + direction * reach, |other| other != polygon);
+        let is_free = |direction: DVec3| !tree.is_blocked(polygon, origin, origin + direction * reach, |_| false);
         if let Some(direction) = hemisphere(normal, 1, DVec2::new(shift.y, shift.x)).next()
             && is_free(direction)
         {

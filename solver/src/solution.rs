@@ -5,7 +5,7 @@ use scene::{Rgb, Scene, luminance};
 use serde::{Deserialize, Serialize};
 
 use crate::linear_fit::fit_inner_nodes;
-use crate::{Elements, NodeId, SkyCells};
+use crate::{Elements, NodeId, Openings, SkyCells};
 
 /// What a solve is asked for.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -168,6 +168,8 @@ pub struct Solution {
     pub visibility: Visibility,
     /// The sky, if the scene has one.
     pub sky: SkyCells,
+    /// Which of its cells are seen from where, in scenes of very many polygons.
+    pub openings: Option<Openings>,
 }
 
 impl Solution {

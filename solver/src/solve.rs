@@ -4,10 +4,13 @@ use glam::DVec3;
 use scene::{Rgb, Scene, luminance};
 
 use crate::cut::{contact_lines, cut_polygon};
+use crate::polygon_tree::PolygonTree;
 use crate::refine::{Network, SourceLight};
 use crate::sky_view::mean_irradiance_from_sky;
 use crate::transport::{Transport, transport};
-use crate::{BlockerLists, Convergence, Cut, ElementLight, Elements, SkyCells, Solution, SolveOptions, Visibility};
+use crate::{
+    BlockerLists, Convergence, Cut, ElementLight, Elements, Openings, SkyCells, Solution, SolveOptions, Visibility,
+};
 
 /// Link error as a fraction of the scene's mean irradiance where none is asked for. Half of it costs the
 /// office half as many elements again.
@@ -31,6 +34,9 @@ const REFINEMENTS: u32 = 3;
 /// Polygons of a scene at most whose pairs are linked. Finding a pair's blockers among all others takes time with the cube of
 /// their number: a few seconds here.
 const MOST_LINKED: usize = 400;
+
+/// Polygons of a scene at most where all elements have shafts to the sky. Of more most are short, and seen by few rays each.
+const MOST_WITH_SHAFTS: usize = 2000;
 
 /// Solves diffuse global illumination for a scene. `progress` is told the fraction that is done, 0..=1.
 ///
@@ -87,6 +93,7 @@ pub fn solve(scene: &Scene, options: &SolveOptions, progress: &(dyn Fn(f64) + Sy
         bounces: options.bounces,
         visibility: Visibility::Links,
         sky: SkyCells::default(),
+        openings: None,
     }
 }
 
@@ -101,7 +108,10 @@ fn unlinked(
     let mut elements = Elements::new(pieces);
     elements.divide_larger((scene.surface_area() * LARGEST_SHARE).sqrt().min(scene.size() * LARGEST_CELL));
     let dark = vec![ElementLight::default(); elements.nodes.len()];
+    let tree = PolygonTree::new(scene);
     let sky = SkyCells::new(scene.environment.as_ref());
+    let has_openings = !sky.is_dark() && scene.polygons.len() > MOST_WITH_SHAFTS;
+    let openings = has_openings.then(|| Openings::new(scene, &tree, &elements, &sky));
     Solution {
         first_link: vec![0; elements.nodes.len() + 1],
         elements,
@@ -112,23 +122,24 @@ fn unlinked(
         irradiance: dark.clone(),
         direct: dark.clone(),
         light: dark,
-        mean_irradiance: guessed_irradiance(scene),
+        mean_irradiance: guessed_irradiance(scene, &tree),
         convergence: Convergence { reached: true, ..Convergence::default() },
         link_error: 0.0,
         bounces: options.bounces,
         visibility: Visibility::Rays,
         sky,
+        openings,
     }
 }
 
 /// Mean irradiance of a closed room with the scene's lamps and walls, and as much light from the sky as arrives, W·m⁻²: light
 /// that escapes, and lamps that shine where few surfaces are, make it less.
-fn guessed_irradiance(scene: &Scene) -> Rgb {
+fn guessed_irradiance(scene: &Scene, tree: &PolygonTree) -> Rgb {
     let sum =
         |of: &dyn Fn(u32) -> Rgb| scene.polygon_ids().map(|polygon| of(polygon) * scene.area(polygon)).sum::<Rgb>();
     let area = sum(&|_| Rgb::ONE);
     let emitted = sum(&|polygon| scene.material(polygon).exitance());
-    let from_sky = mean_irradiance_from_sky(scene) * area;
+    let from_sky = mean_irradiance_from_sky(scene, tree) * area;
     let absorbed = sum(&|polygon| Rgb::ONE - scene.reflectance(polygon));
     if area.x > 0.0 { (emitted + from_sky) / absorbed.max(area * LEAST_ABSORBED) } else { Rgb::ZERO }
 }

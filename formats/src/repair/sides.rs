@@ -22,17 +22,20 @@ pub(crate) struct OtherSides {
 ///
 /// `said` is what files say of materials, and decides where they do: two sides or one. If no winding is `doubted`, that is
 /// all. If it is, all other polygons get one that are not part of a closed, consistently wound shell with its fronts where
-/// they are seen from: a solid with its fronts outwards, or a room around a lamp or a camera, with its fronts inwards.
+/// they are seen from: a solid with its fronts outwards, or a room around a lamp or a camera, with its fronts inwards. The
+/// inside of such a solid gets none, whatever is said: no light enters, and nobody looks. Modellers call all they make two-sided.
 pub(crate) fn add_other_sides(scene: &mut Scene, doubted: bool, said: &BTreeMap<u32, bool>) -> OtherSides {
     let mut counts = OtherSides::default();
     if !doubted && !said.values().any(|&two_sided| two_sided) {
         return counts;
     }
     let known = other_sides(scene);
-    let trusted = if doubted { trusted(scene) } else { vec![true; scene.polygons.len()] };
+    let wound = wound(scene);
     for polygon in scene.polygon_ids() {
+        let wound = wound[polygon as usize];
         let word = said.get(&scene.polygons[polygon as usize].material).copied();
-        if !word.unwrap_or(!trusted[polygon as usize]) || known[polygon as usize].is_some() {
+        let lacks = word.unwrap_or(doubted && wound == Wound::Anyhow) && wound != Wound::AroundSolid;
+        if !lacks || known[polygon as usize].is_some() {
             continue;
         }
         add_other_side(scene, polygon);
@@ -63,12 +66,26 @@ fn add_other_side(scene: &mut Scene, polygon: u32) {
     scene.polygons.push(Polygon { first_corner: first_corner as u32, ..record });
 }
 
-/// By polygon, whether it is part of a shell whose winding is to be trusted.
-fn trusted(scene: &Scene) -> Vec<bool> {
+/// What is known of a polygon's winding.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Wound {
+    /// Nothing.
+    Anyhow,
+    /// It is part of a closed solid, its front to the outside.
+    AroundSolid,
+    /// It is part of a closed room around a lamp or a camera, its front to the inside.
+    AroundRoom,
+}
+
+fn wound(scene: &Scene) -> Vec<Wound> {
     let shells = Shells::of(scene);
     let within = shells.around(scene, &places(scene));
-    let is_trusted = |shell: usize| shells.closed[shell] && (shells.volumes[shell] > 0.0) != within[shell];
-    shells.of_polygon.iter().map(|&shell| is_trusted(shell as usize)).collect()
+    let of_shell = |shell: usize| match (shells.closed[shell], shells.volumes[shell] > 0.0, within[shell]) {
+        (true, true, false) => Wound::AroundSolid,
+        (true, false, true) => Wound::AroundRoom,
+        _ => Wound::Anyhow,
+    };
+    shells.of_polygon.iter().map(|&shell| of_shell(shell as usize)).collect()
 }
 
 /// Where cameras stand, and lamps, with the polygon that is the lamp.
@@ -235,7 +252,8 @@ mod tests {
             assert_eq!(doubted(&mut room), OtherSides { added: added + 1, doubtful_lamps: 1 });
         }
     }
-    /// Sheets and a solid of paint, and a lamp outside of it: the file's word on a material stands above all doubt.
+    /// Sheets and a solid of paint, and a lamp outside of it: the file's word on a material stands above all doubt, but for
+    /// the inside of the solid.
     #[test]
     fn what_the_file_says_of_a_material_decides() {
         let scene = || cubes(&[(1.0, true, &[0, 1], 0), (0.2, true, ALL, 0), (0.4, true, &[0], 1)]);
@@ -246,10 +264,10 @@ mod tests {
         assert_eq!(added(false, &[]), sides(0, 0));
         assert_eq!(added(false, &[(0, false)]), sides(0, 0));
         assert_eq!(added(false, &[(1, true)]), sides(1, 0));
-        assert_eq!(added(false, &[(0, true), (1, false)]), sides(8, 0));
+        assert_eq!(added(false, &[(0, true), (1, false)]), sides(2, 0));
         assert_eq!(added(true, &[]), sides(3, 1));
         assert_eq!(added(true, &[(1, false)]), sides(2, 0));
-        assert_eq!(added(true, &[(0, true)]), sides(9, 1));
+        assert_eq!(added(true, &[(0, true)]), sides(3, 1));
         assert_eq!(added(true, &[(0, false), (1, true)]), sides(1, 0));
     }
 

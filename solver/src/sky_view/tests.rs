@@ -8,7 +8,7 @@ use scene::{CieSky, Environment, LatLongMap, Sky, UpAxis};
 use super::*;
 use crate::form_factor::form_factor_at;
 use crate::testing::Builder;
-use crate::{Solution, SolveOptions, solve};
+use crate::{SkyCells, Solution, SolveOptions, solve};
 
 fn map(width: u32, height: u32, texels: Vec<Vec3>) -> Environment {
     Environment { sky: Sky::Map(LatLongMap { width, height, texels }), up: UpAxis::Z, rotation: 0.0, scale: 1.0 }
