@@ -11,6 +11,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::{CieSky, Rgb};
 
+/// Angular radius of the sun's disc, radians: half of 0.533°, the mean over a year. Its radiance is even over the disc.
+pub const SUN_RADIUS: f64 = 0.533 / 2.0 * PI / 180.0;
+
 /// The axis of the scene that points up in an environment.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum UpAxis {

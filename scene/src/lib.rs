@@ -30,7 +30,7 @@ pub use bvh::{Bvh, Hit};
 pub use camera::{Camera, NamedCamera};
 pub use camera_path::{CameraKey, CameraPath, CameraPathError};
 pub use cie_sky::{CIE_SKIES, CieSky};
-pub use environment::{Environment, LatLongMap, Sky, UpAxis, texel_solid_angle};
+pub use environment::{Environment, LatLongMap, SUN_RADIUS, Sky, UpAxis, texel_solid_angle};
 pub use exposure::{Display, Exposure, MIDDLE_GREY, ToneCurve, decode_srgb, encode_srgb};
 pub use half_edge::{HalfEdges, NO_TWIN};
 pub use interpolant::{Interpolant, SAMPLE_BARYCENTRICS};
