@@ -186,9 +186,9 @@ impl<'a> PathTracer<'a> {
         sum / f64::from(samples)
     }
 
-    /// One sample of the irradiance that reaches a receiver by way of one to `bounces` reflections, W·m⁻², and what the directions
-    /// followed say of direct light from the environment. The first bounce uses the four numbers given, in 0..1; later ones
-    /// draw their own.
+    /// One sample of the irradiance that reaches a receiver by way of one to `bounces` reflections, W·m⁻², and what the
+    /// directions followed say of direct light from the environment. The first bounce uses the four numbers given, in 0..1;
+    /// later ones draw their own.
     fn reflected(
         &self,
         receiver: &Receiver,

@@ -1,10 +1,10 @@
 //! Light straight from a scene's environment: samples of the irradiance that it gives a point.
 //!
 //! A sky is sampled in two ways: by a direction drawn by its light, and by the direction that a path follows anyway, spread by
-//! the cosine. The first knows a small bright sky, the second a small window. They are combined by the balance heuristic of Veach and
-//! Guibas, "Optimally Combining Sampling Techniques for Monte Carlo Rendering", SIGGRAPH 1995, section 4.1: for one sample each,
-//! both add L·cos θ/(p + cos θ/π), p the first one's density. The sun of a sky by the standard is so small that no direction
-//! followed need look for it: it has a sample of its own, and counts in no other.
+//! the cosine. The first knows a small bright sky, the second a small window. They are combined by the balance heuristic of
+//! Veach and Guibas, "Optimally Combining Sampling Techniques for Monte Carlo Rendering", SIGGRAPH 1995, section 4.1: for one
+//! sample each, both add L·cos θ/(p + cos θ/π), p the first one's density. The sun of a sky by the standard is so small that no
+//! direction followed need look for it: it has a sample of its own, and counts in no other.
 
 use std::f64::consts::{PI, TAU};
 
@@ -43,8 +43,8 @@ impl<'a> SkyLight<'a> {
         Some(Self { environment, table, sun })
     }
 
-    /// The first sample of direct irradiance at a receiver, W·m⁻², from two uniform numbers in 0..1: a direction of the sky drawn
-    /// by its light, and one of the sun.
+    /// The first sample of direct irradiance at a receiver, W·m⁻², from two uniform numbers in 0..1: a direction of the sky
+    /// drawn by its light, and one of the sun.
     pub fn irradiance(&self, surfaces: &Surfaces<'_>, receiver: &Receiver, numbers: [f64; 2]) -> Rgb {
         let (u, v) = self.table.draw(numbers);
         let direction = self.environment.direction(u, v);
@@ -59,8 +59,8 @@ impl<'a> SkyLight<'a> {
         sky + unless_blocked(light, direction)
     }
 
-    /// What either sample of the sky adds to irradiance, W·m⁻², if it has drawn a unit direction that nothing blocks: the second
-    /// one's density is the cosine over π.
+    /// What either sample of the sky adds to irradiance, W·m⁻², if it has drawn a unit direction that nothing blocks: the
+    /// second one's density is the cosine over π.
     pub fn along(&self, receiver: &Receiver, direction: DVec3) -> Rgb {
         let cosine = receiver.cosine_to(direction);
         if cosine <= 0.0 {
@@ -72,8 +72,8 @@ impl<'a> SkyLight<'a> {
 }
 
 impl Sun {
-    /// A unit direction to the disc: even over the disc as a flat one, so its density is its cosine to the middle over π·sin² of the
-    /// radius, and its light is the same at every place of it.
+    /// A unit direction to the disc: even over the disc as a flat one, so its density is its cosine to the middle over π·sin²
+    /// of the radius, and its light is the same at every place of it.
     fn draw(&self, [u, v]: [f64; 2]) -> DVec3 {
         let radius = u.sqrt() * SUN_RADIUS.sin();
         let (sin, cos) = (TAU * v).sin_cos();
@@ -175,8 +175,8 @@ mod tests {
         }
     }
 
-    /// In a dark room with a window in its ceiling a point on the floor has π·L times the window's form factor, and half of it is
-    /// seen past a sheet whose back is down.
+    /// In a dark room with a window in its ceiling a point on the floor has π·L times the window's form factor, and half of it
+    /// is seen past a sheet whose back is down.
     #[test]
     fn a_window_lets_in_what_its_form_factor_says() {
         let mut faces = room(DVec3::new(-2.0, -2.0, 0.0), DVec3::new(2.0, 2.0, 3.0));

@@ -1,14 +1,14 @@
 //! Directions drawn by how much light comes from them: a table over the cells of a picture of all directions.
 //!
-//! As in Pharr, Jakob and Humphreys, "Physically Based Rendering", 4th edition, section 12.5.2, a row is drawn and then a cell of
-//! it. Within a cell directions are even over its solid angle, as the light of a texel is, and not over the picture.
+//! As in Pharr, Jakob and Humphreys, "Physically Based Rendering", 4th edition, section 12.5.2, a row is drawn and then a cell
+//! of it. Within a cell directions are even over its solid angle, as the light of a texel is, and not over the picture.
 
 use std::f64::consts::PI;
 
 use scene::{Environment, Sky, texel_solid_angle};
 
-/// Rows of the table of a sky by the standard, and half of its columns: cells of 0.7°, over which the brightest of them change by
-/// a twentieth beside the sun. Twice as many would save no ray that counts.
+/// Rows of the table of a sky by the standard, and half of its columns: cells of 0.7°, over which the light
+/// beside the sun changes by 4 % at most. In finer ones samples would not scatter less.
 const ROWS: u32 = 256;
 
 /// The light of every cell of an environment that is not black, without its sun.
@@ -67,8 +67,8 @@ impl SkyTable {
     }
 }
 
-/// Of parts that begin at `start` and of which each ends at `end`, the one that a share of the whole falls into, and the place in
-/// it, 0..=1.
+/// Of parts that begin at `start` and of which each ends at `end`, the one that a share of the whole falls into, and the place
+/// in it, 0..=1.
 fn part(start: f64, count: usize, end: impl Fn(usize) -> f64, share: f64) -> (usize, f64) {
     let target = start + share * (end(count - 1) - start);
     let (mut first, mut last) = (0, count - 1);

@@ -97,6 +97,15 @@ impl Environment {
         is_sky && self.rotation.is_finite() && self.scale.is_finite() && self.scale >= 0.0
     }
 
+    /// Whether no light comes from anywhere.
+    pub fn is_black(&self) -> bool {
+        let is_black = match &self.sky {
+            Sky::Map(map) => map.texels.iter().all(|texel| *texel == Vec3::ZERO),
+            Sky::Cie(_) => false,
+        };
+        is_black || self.scale == 0.0
+    }
+
     /// The unit direction of a place in the picture.
     pub fn direction(&self, u: f64, v: f64) -> DVec3 {
         let azimuth = (u - 0.5) * TAU + self.rotation;
@@ -208,6 +217,15 @@ mod tests {
         }
         let empty = Sky::Map(LatLongMap { width: 0, height: 3, texels: vec![] });
         assert!(!Environment { sky: empty, ..sound }.is_valid());
+    }
+
+    #[test]
+    fn black_is_what_sends_no_light() {
+        assert!(map(1, 1).is_black() && !map(2, 1).is_black());
+        assert!(Environment { scale: 0.0, ..map(2, 1) }.is_black());
+        let sky = Sky::Cie(CieSky::new(1, CieSky::DEFAULT_SUN, 0.0).unwrap());
+        assert!(!Environment { sky: sky.clone(), ..map(1, 1) }.is_black());
+        assert!(Environment { sky, scale: 0.0, ..map(1, 1) }.is_black());
     }
 
     #[test]

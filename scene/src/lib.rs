@@ -14,6 +14,7 @@ mod exposure;
 mod half_edge;
 mod interpolant;
 mod light;
+mod map_reduction;
 mod material;
 mod polygon;
 mod ray;
