@@ -13,11 +13,13 @@ use viewer::Mode;
 
 use crate::failure::Usage;
 
+mod environment;
 mod render;
 mod sky;
 
+pub use environment::{EnvironmentFlags, SkySource};
 pub use render::{Budget, Interpolation, RadianceChoice, RadianceFlags, RenderFlags, SamplerChoice};
-pub use sky::{SkyFlags, SkySource};
+pub use sky::SkyFlags;
 
 /// Largest side of a picture, pixels: what every GPU of the last ten years takes as a texture.
 const LARGEST_SIDE: u32 = 16_384;
@@ -89,12 +91,15 @@ pub struct BakeFlags {
 }
 
 /// How a scene is read; a bake holds its scene as it was read then.
-#[derive(Clone, Copy, Debug, Default, Args)]
+#[derive(Clone, Debug, Default, Args)]
 pub struct SceneFlags {
     /// Take faces as two-sided, where the scene's winding is not to be trusted: all but closed solids and rooms, and materials
     /// of which a scene file says two_sided = false, get the other side that they lack
     #[arg(long)]
     pub two_sided: bool,
+    /// The light from far away
+    #[command(flatten)]
+    pub sky: EnvironmentFlags,
 }
 
 /// What a bake's light depends on; none means the default of the stage that it belongs to.

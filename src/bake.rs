@@ -23,7 +23,7 @@ pub fn run(flags: &BakeFlags, outputs: &Outputs, interrupt: &Interrupt) -> Resul
     let output = outputs.claim(&flags.output)?;
     let resumed = if flags.resume { Some(Resumed::read(flags)?) } else { None };
     memory::check_file(flags)?;
-    let (Imported { scene, .. }, import_seconds) = read_scene(&flags.scene, flags.reading)?;
+    let (Imported { scene, .. }, import_seconds) = read_scene(&flags.scene, &flags.reading)?;
     require_light(&flags.scene, &scene)?;
     memory::check_scene(flags, scene.polygons.len())?;
     let answers = resumed.map_or_else(|| Ok(Answers::default()), |resumed| resumed.answers_about(&scene, flags))?;

@@ -14,7 +14,7 @@ use crate::report::print_json;
 /// Writes the folder of the page.
 pub fn run(flags: &ExportFlags, outputs: &Outputs) -> Result<Outcome> {
     let output = OutputFolder::claim(&flags.web, outputs)?;
-    let input = Input::read(&flags.input, flags.reading)?;
+    let input = Input::read(&flags.input, &flags.reading)?;
     let baked = input.into_baked(&flags.input, &Default::default(), outputs)?;
     let name = flags.input.file_stem().unwrap_or(flags.input.as_os_str()).to_string_lossy();
     let page = web_page(&baked, &name);

@@ -4,7 +4,7 @@ use std::io::Write;
 
 use anyhow::{Context, Result};
 use formats::{ImportReport, Imported};
-use scene::{Baked, Scene, Texture};
+use scene::{Baked, CieSky, Environment, Scene, Sky, Texture};
 use serde::Serialize;
 
 use crate::args::InfoFlags;
@@ -16,12 +16,12 @@ use crate::report::{peak_memory, print_json};
 /// Describes a scene or a bake.
 pub fn run(flags: &InfoFlags) -> Result<Outcome> {
     let info = if formats::is_baked(&flags.input) {
-        no_bake(&flags.input, flags.reading)?;
+        no_bake(&flags.input, &flags.reading)?;
         let (baked, unfinished) = formats::read_unfinished(&flags.input)?;
         let bake = BakeInfo::of(&baked, unfinished.is_some());
         Info { scene: SceneInfo::of(&baked.scene), import: None, bake: Some(bake) }
     } else {
-        let (Imported { scene, report }, seconds) = read_scene(&flags.input, flags.reading)?;
+        let (Imported { scene, report }, seconds) = read_scene(&flags.input, &flags.reading)?;
         let import = ImportInfo { report, seconds, peak_memory_bytes: peak_memory() };
         Info { scene: SceneInfo::of(&scene), import: Some(import), bake: None }
     };
@@ -55,6 +55,24 @@ struct SceneInfo {
     bounds: [[f64; 3]; 2],
     cameras: Vec<String>,
     textures: Vec<TextureInfo>,
+    /// Null without one.
+    environment: Option<EnvironmentInfo>,
+}
+
+#[derive(Serialize)]
+struct EnvironmentInfo {
+    /// "map", or the number of a sky of the CIE as "cie:12".
+    sky: String,
+    /// Texels of a map as the scene has it; null for a sky of the CIE.
+    size: Option<[u32; 2]>,
+    /// Azimuth and altitude of the sun of a sky of the CIE, degrees; null for a map.
+    sun: Option<[f64; 2]>,
+    /// What that sun itself sends to a surface that faces it, W·m⁻², before the scale.
+    sun_irradiance: Option<f64>,
+    up: &'static str,
+    /// Degrees clockwise.
+    rotation: f64,
+    scale: f64,
 }
 
 #[derive(Serialize)]
@@ -106,7 +124,35 @@ impl SceneInfo {
             bounds: [low.to_array(), high.to_array()],
             cameras: scene.cameras.iter().map(|camera| camera.name.clone()).collect(),
             textures: (0..).zip(&scene.textures).map(|(id, texture)| TextureInfo::of(scene, id, texture)).collect(),
+            environment: scene.environment.as_ref().map(EnvironmentInfo::of),
         }
+    }
+}
+
+impl EnvironmentInfo {
+    fn of(environment: &Environment) -> Self {
+        let (sky, size, cie) = match &environment.sky {
+            Sky::Map(map) => ("map".to_owned(), Some([map.width, map.height]), None),
+            Sky::Cie(sky) => (format!("cie:{}", sky.kind()), None, Some(sky)),
+        };
+        Self {
+            sky,
+            size,
+            sun: cie.map(|sky| sky.sun().map(f64::to_degrees)),
+            sun_irradiance: cie.map(CieSky::sun_irradiance),
+            up: environment.up.name(),
+            rotation: environment.rotation.to_degrees(),
+            scale: environment.scale,
+        }
+    }
+
+    fn text(&self) -> String {
+        let Self { sky, size, sun, sun_irradiance, up, rotation, scale } = self;
+        let size = size.map_or_else(String::new, |[width, height]| format!(" of {width}x{height}"));
+        let sun = sun.zip(*sun_irradiance).map_or_else(String::new, |([azimuth, altitude], irradiance)| {
+            format!(", sun of {irradiance:.4} W/m² at {azimuth:.1}°, {altitude:.1}°")
+        });
+        format!("environment      {sky}{size}{sun}; {up} is up, turned by {rotation:.1}°, times {scale:.4}\n")
     }
 }
 
@@ -151,6 +197,7 @@ impl Info {
             bounds: [low, high],
             cameras,
             textures,
+            environment,
         } = &self.scene;
         let cameras = if cameras.is_empty() { "none".to_owned() } else { cameras.join(", ") };
         let mut text = format!(
@@ -162,6 +209,7 @@ impl Info {
             triple(high),
             triple(power)
         );
+        text.extend(environment.as_ref().map(EnvironmentInfo::text));
         if !textures.is_empty() {
             text += &format!("textures         {}\n", textures.len());
         }

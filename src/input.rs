@@ -6,10 +6,11 @@ use std::time::UNIX_EPOCH;
 use anyhow::{Context, Result, bail, ensure};
 use etcetera::BaseStrategy;
 use formats::{Imported, Sides};
-use scene::{Baked, Scene};
+use scene::{Baked, Scene, Sky};
 
-use crate::args::{LightFlags, SceneFlags};
+use crate::args::{EnvironmentFlags, LightFlags, SceneFlags};
 use crate::bake::missed;
+use crate::environment::environment;
 use crate::failure::Usage;
 use crate::output::Outputs;
 use crate::pipeline::{self, Onlooker};
@@ -26,7 +27,7 @@ pub enum Input {
 
 impl Input {
     /// Reads a scene or a bake, whichever the file is.
-    pub fn read(path: &Path, flags: SceneFlags) -> Result<Self> {
+    pub fn read(path: &Path, flags: &SceneFlags) -> Result<Self> {
         if formats::is_baked(path) {
             no_bake(path, flags)?;
             Ok(Self::Baked(formats::read_baked(path)?))
@@ -48,9 +49,17 @@ impl Input {
 }
 
 /// Reads a scene, passing on what the importer repaired; the seconds it took stand beside it.
-pub fn read_scene(path: &Path, flags: SceneFlags) -> Result<(Imported, f64)> {
+pub fn read_scene(path: &Path, flags: &SceneFlags) -> Result<(Imported, f64)> {
     let stage = Stage::start("import");
-    let imported = formats::read_scene_as(path, if flags.two_sided { Sides::Both } else { Sides::AsWound })?;
+    let mut imported = formats::read_scene_as(path, if flags.two_sided { Sides::Both } else { Sides::AsWound })?;
+    if let Some(source) = &flags.sky.environment {
+        let (mut environment, warnings) = environment(&flags.sky, source)?;
+        if let Sky::Map(map) = environment.sky {
+            environment.sky = Sky::Map(map.bounded());
+        }
+        imported.scene.environment = Some(environment);
+        imported.report.warnings.extend(warnings);
+    }
     let seconds = stage.end();
     for warning in &imported.report.warnings {
         say(format_args!("warning: {warning}"));
@@ -59,17 +68,17 @@ pub fn read_scene(path: &Path, flags: SceneFlags) -> Result<(Imported, f64)> {
 }
 
 /// Refuses flags that say how a scene is read, where the file is a bake.
-pub fn no_bake(path: &Path, flags: SceneFlags) -> Result<()> {
-    if flags.two_sided {
-        let path = path.display();
-        bail!(Usage(format!(
-            "--two-sided says how a scene is read, and {path} is a bake; give it when the scene is baked"
-        )));
-    }
-    Ok(())
+pub fn no_bake(path: &Path, flags: &SceneFlags) -> Result<()> {
+    let given = match flags {
+        SceneFlags { two_sided: true, .. } => "--two-sided",
+        SceneFlags { sky: EnvironmentFlags { environment: Some(_), .. }, .. } => "--environment",
+        _ => return Ok(()),
+    };
+    let path = path.display();
+    bail!(Usage(format!("{given} says how a scene is read, and {path} is a bake; give it when the scene is baked")));
 }
 
-/// Refuses a scene without surfaces that emit; says of other lights that they count nothing.
+/// Refuses a scene without surfaces that emit and without an environment; says of other lights that they count nothing.
 pub fn require_light(path: &Path, scene: &Scene) -> Result<()> {
     if !scene.lights.is_empty() {
         say(format_args!(
@@ -80,9 +89,10 @@ pub fn require_light(path: &Path, scene: &Scene) -> Result<()> {
         ));
     }
     ensure!(
-        scene.emitters().next().is_some(),
+        scene.emitters().next().is_some() || scene.environment.as_ref().is_some_and(|sky| !sky.is_black()),
         "{}: nothing emits light; give a material that its faces use an emitted radiance (W/(sr m²)), such as the line \
-         `Ke 10 10 10` in the MTL file, an emissive factor in a glTF file, or `radiance = 10` in a scene file",
+         `Ke 10 10 10` in the MTL file, an emissive factor in a glTF file, or `radiance = 10` in a scene file, or give the scene \
+         light from outside, such as --environment cie:12",
         path.display()
     );
     Ok(())

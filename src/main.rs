@@ -6,6 +6,7 @@ mod args;
 mod artist;
 mod bake;
 mod compare;
+mod environment;
 mod error_picture;
 mod export;
 mod failure;

@@ -34,7 +34,7 @@ pub fn run(flags: &ProbeFlags, outputs: &Outputs) -> Result<Outcome> {
     }
     let output = flags.output.as_deref().map(|path| outputs.claim(path)).transpose()?;
     let points = formats::read_points(&flags.points)?;
-    let input = Input::read(&flags.input, flags.reading)?;
+    let input = Input::read(&flags.input, &flags.reading)?;
     let asked = LightFlags { bounces: flags.bounces, ..LightFlags::default() };
     let mut standard_errors = None;
     let found = match (flags.method, input) {

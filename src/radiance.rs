@@ -107,9 +107,9 @@ pub fn with_evaluator<T>(
     let work = |evaluate: &Evaluator<'_>| work(evaluate, &lines);
     if flags.radiance.radiance == RadianceChoice::Whitted {
         ensure!(
-            scene.emitters().next().is_some() || !scene.lights.is_empty(),
+            scene.emitters().next().is_some() || !scene.lights.is_empty() || scene.environment.is_some(),
             "{}: there is no light; give a material an emitted radiance (W/(sr m²)), such as the line `Ke 10 10 10` in the MTL \
-             file, or add a [[light]] in a scene file",
+             file, or add a [[light]] or an [environment] in a scene file",
             flags.input.display()
         );
         return by_whitted(&scene, &view, work);

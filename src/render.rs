@@ -36,7 +36,7 @@ const FIRST_SNAPSHOT: u64 = 1024;
 
 /// Makes a picture.
 pub fn run(flags: &RenderFlags, outputs: &Outputs, interrupt: &Interrupt) -> Result<Outcome> {
-    if let Some(source) = &flags.sky.environment {
+    if let Some(source) = &flags.reading.sky.environment {
         return sky::run(flags, source, outputs);
     }
     flags.camera.viewpoint()?;
@@ -53,7 +53,7 @@ pub fn run(flags: &RenderFlags, outputs: &Outputs, interrupt: &Interrupt) -> Res
     if let Some(folder) = &flags.snapshots {
         std::fs::create_dir_all(folder).with_context(|| format!("cannot make the folder {}", folder.display()))?;
     }
-    let input = Input::read(&flags.input, flags.reading)?;
+    let input = Input::read(&flags.input, &flags.reading)?;
     radiance::with_evaluator(input, flags, outputs, |evaluate, lines| {
         let exposure = match flags.exposure {
             ExposureChoice::Fixed(exposure) => exposure,

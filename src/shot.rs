@@ -35,7 +35,7 @@ pub fn run(flags: &ShotFlags, outputs: &Outputs) -> Result<Outcome> {
         let (w, h) = (reference.width, reference.height);
         bail!(Usage(format!("--size {width}x{height}: the reference has {w}x{h} pixels; give --size {w}x{h}")));
     }
-    let input = Input::read(&flags.input, flags.reading)?;
+    let input = Input::read(&flags.input, &flags.reading)?;
     let baked = input.into_baked(&flags.input, &Default::default(), outputs)?;
     let cameras = match &path {
         Some(path) => along(path, flags.frames()),

@@ -1,14 +1,13 @@
 //! `halflight render --environment`: a scene under a sky, whose light is that of a few hundred directions.
 
-use std::f64::consts::FRAC_PI_4;
-
 use anyhow::{Context, Result, bail};
 use glam::Vec3;
 use renderer::{Coherence, EnvironmentLights, Eye, SkyPicture, SkySeconds, Visibility, sky_picture};
-use scene::{Bvh, CieSky, Display, Environment, Exposure, Sky, luminance};
+use scene::{Bvh, Display, Exposure, luminance};
 use serde::Serialize;
 
-use crate::args::{ExposureChoice, ImageKind, RenderFlags, SkyFlags, SkySource};
+use crate::args::{ExposureChoice, ImageKind, RenderFlags, SceneFlags, SkyFlags, SkySource};
+use crate::environment::environment;
 use crate::failure::{Outcome, Usage};
 use crate::input::Input;
 use crate::output::{Output, Outputs};
@@ -16,9 +15,6 @@ use crate::picture::encoded;
 use crate::progress::{Stage, say};
 use crate::report::print_json;
 use crate::shot::camera;
-
-/// Where the sun stands if nothing is said: in the south-east, half-way up.
-const SUN: [f64; 2] = [3.0 * FRAC_PI_4, FRAC_PI_4];
 
 /// Columns and rows of the picture of a sky.
 const SKY_PICTURE: [u32; 2] = [1024, 512];
@@ -31,11 +27,16 @@ pub fn run(flags: &RenderFlags, source: &SkySource, outputs: &Outputs) -> Result
     let viewpoint = flags.camera.viewpoint()?;
     let sky = &flags.sky;
     let visibility = visibility(sky)?;
-    let environment = environment(sky, source)?;
+    let (environment, warnings) = environment(&flags.reading.sky, source)?;
+    for warning in &warnings {
+        say(format_args!("warning: {warning}"));
+    }
     let output = outputs.claim(&flags.output)?;
     let claim = |path: &Option<std::path::PathBuf>| path.as_deref().map(|path| outputs.claim(path)).transpose();
     let (ray_map, cells) = (claim(&sky.ray_map)?, claim(&sky.sky_picture)?);
-    let scene = match Input::read(&flags.input, flags.reading)? {
+    // The environment is the picture's: a bake has nothing to do with it.
+    let reading = SceneFlags { two_sided: flags.reading.two_sided, ..SceneFlags::default() };
+    let scene = match Input::read(&flags.input, &reading)? {
         Input::Scene(scene) => scene,
         Input::Baked(baked) => baked.scene,
     };
@@ -93,29 +94,6 @@ fn visibility(flags: &SkyFlags) -> Result<Visibility> {
             bail!(Usage("--visibility full predicts nothing; leave --brightest and --guessed out".into()))
         }
     }
-}
-
-/// The environment that flags describe.
-fn environment(flags: &SkyFlags, source: &SkySource) -> Result<Environment> {
-    let sky = match source {
-        SkySource::Cie(kind) => {
-            let sky = CieSky::new(*kind, flags.sun.unwrap_or(SUN), flags.sun_irradiance.unwrap_or(0.0));
-            Sky::Cie(sky.context("the sun is nowhere")?)
-        }
-        SkySource::Map(path) => {
-            if flags.sun.is_some() || flags.sun_irradiance.is_some() {
-                bail!(Usage(
-                    "--sun: a map has its own; leave --sun and --sun-irradiance out, or give cie:1 to cie:16".into()
-                ));
-            }
-            let read = formats::read_environment(path)?;
-            for warning in &read.warnings {
-                say(format_args!("warning: {warning}"));
-            }
-            Sky::Map(read.map)
-        }
-    };
-    Ok(Environment { sky, up: flags.sky_up, rotation: flags.sky_rotation.to_radians(), scale: flags.sky_scale })
 }
 
 fn write(output: &Output, (width, height): (u32, u32), radiance: &[Vec3], display: Display) -> Result<()> {

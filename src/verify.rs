@@ -37,7 +37,7 @@ pub fn run(flags: &VerifyFlags, outputs: &Outputs) -> Result<Outcome> {
     let viewpoint = flags.camera.viewpoint()?;
     let picture = flags.picture.as_deref().map(|path| outputs.claim(path)).transpose()?;
     let table = flags.output.as_deref().map(|path| outputs.claim(path)).transpose()?;
-    let input = Input::read(&flags.input, flags.reading)?;
+    let input = Input::read(&flags.input, &flags.reading)?;
     let defaults = LightFlags::default();
     let asked = LightFlags { tolerance: flags.tolerance.unwrap_or(defaults.tolerance), ..defaults };
     let baked = input.into_baked(&flags.input, &asked, outputs)?;

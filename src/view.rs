@@ -36,7 +36,7 @@ pub fn run(flags: &ViewFlags, outputs: &Outputs) -> Result<Outcome> {
     let watch = Watch::over(&path);
     // What is not there, and what is no bake, is said without a window.
     let is_at_hand = formats::is_baked(&path) || !path.exists();
-    let input = if is_at_hand { Some(Input::read(&path, flags.reading)?) } else { None };
+    let input = if is_at_hand { Some(Input::read(&path, &flags.reading)?) } else { None };
     let mut system = WindowSystem::connect().context(NO_WINDOW)?;
     let (updates, received) = channel();
     let mut work = None;
@@ -46,7 +46,7 @@ pub fn run(flags: &ViewFlags, outputs: &Outputs) -> Result<Outcome> {
         tell(&updates, Update::Bake(Arc::new(baked)));
         std::thread::spawn(move || watch.keep(|path| reload(path, &updates)));
     } else {
-        work = Some(bake_behind(path, flags.reading, viewpoint, outputs.clone(), updates));
+        work = Some(bake_behind(path, flags.reading.clone(), viewpoint, outputs.clone(), updates));
     }
     let seen = system.open(walkthrough(flags, received, outputs.clone()));
     // A bake that is not finished ends with the program, but not in the midst of a file.
@@ -114,7 +114,7 @@ fn bake_behind(
     std::thread::spawn(move || {
         let processors = std::thread::available_parallelism().map_or(1, usize::from);
         let threads = ThreadPoolBuilder::new().num_threads((processors - 1).max(1)).build()?;
-        let baked = threads.install(|| bake_before(&path, reading, &viewpoint, &outputs, &updates));
+        let baked = threads.install(|| bake_before(&path, &reading, &viewpoint, &outputs, &updates));
         match &baked {
             Err(error) if error.is::<Usage>() => tell(&updates, Update::Close),
             Err(error) => tell(&updates, Update::Notice(sentence(error))),
@@ -127,7 +127,7 @@ fn bake_behind(
 
 fn bake_before(
     path: &Path,
-    reading: SceneFlags,
+    reading: &SceneFlags,
     viewpoint: &Viewpoint,
     outputs: &Outputs,
     updates: &Sender<Update>,

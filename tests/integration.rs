@@ -11,6 +11,7 @@ mod cli;
 mod closed_forms;
 mod coherence;
 mod continuity;
+mod daylight;
 mod desktop;
 mod determinism;
 mod environment;

@@ -74,6 +74,8 @@ pub fn read_scene(path: &Path) -> Result<Imported, FormatError> {
 /// radiance, nits per channel taken as W·sr⁻¹·m⁻²; double-sided materials make two polygons, and what is translucent with a
 /// mean alpha below 0.5, or transmits half of the light, is left out. Cameras keep their names.
 ///
+/// A scene file's environment keeps at most 2048 × 1024 texels of its map.
+///
 /// Light is computed with the mean colour of a texture over each polygon ([`Scene::reflectance`]).
 ///
 /// Cameras of an OBJ stand in comments `# camera eye X Y Z dir X Y Z up X Y Z fov_deg D` (the full vertical
@@ -144,6 +146,7 @@ fn repair(path: &Path, mut model: Model, sides: Sides, report: &mut ImportReport
         objects: model.objects,
         cameras: model.cameras,
         lights: model.lights,
+        environment: model.environment,
         ..Scene::default()
     };
     // Vertices that no polygon uses any more are left out; the others are numbered as polygons come to them.

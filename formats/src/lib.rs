@@ -9,6 +9,7 @@ mod baked_file;
 mod camera;
 mod camera_path_file;
 mod convex;
+mod environment_entry;
 mod environment_file;
 mod error;
 mod face;

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, HashMap};
 
 use glam::{DMat3, DMat4, DVec3};
-use scene::{Light, Material, NamedCamera, Texture, area_vector};
+use scene::{Environment, Light, Material, NamedCamera, Texture, area_vector};
 
 use crate::attributes::AttributeTable;
 use crate::face::{Corner, Face};
@@ -25,6 +25,7 @@ pub(crate) struct Model {
     pub cameras: Vec<NamedCamera>,
     /// Lights that are no surfaces.
     pub lights: Vec<Light>,
+    pub environment: Option<Environment>,
     /// The direction that the file says is up.
     pub up: Option<DVec3>,
     /// What [`Face::line`] counts, for messages; empty is lines.

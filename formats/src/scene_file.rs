@@ -34,6 +34,15 @@
 //! [[light]]
 //! towards = [0, 0.5, 1]       # the direction of a light that is far away
 //! irradiance = [3, 3, 2.5]    # W/m² on a surface that faces it
+//!
+//! [environment]               # light from all around
+//! map = "sky.hdr"             # .hdr or .exr, a picture of all directions beside this file, or
+//! # sky = 12                  # a general sky of the CIE, 1 to 16, of 1 W/(sr m²) at the zenith
+//! up = "z"                    # what points up under it: x, y or z (the scene's)
+//! rotation = 90               # degrees clockwise, seen from above; north is y where z is up, and -z where y is
+//! scale = 2                   # a factor
+//! # sun = [135, 45]           # of a sky: where the sun stands, degrees clockwise from north and over the horizon
+//! # sun_irradiance = 800      # W/m² on a surface that faces it (0)
 //! ```
 //!
 //! A key that is not listed here is an error.
@@ -43,11 +52,12 @@ use std::f64::consts::FRAC_PI_2;
 use std::path::Path;
 
 use glam::{DMat3, DMat4, DVec3};
-use scene::{Camera, Gloss, Light, NamedCamera, Rgb};
+use scene::{Camera, Gloss, Light, NamedCamera, Rgb, UpAxis};
 use serde::Deserialize;
 use toml::Spanned;
 
 use crate::FormatError;
+use crate::environment_entry::{EnvironmentEntry, environment_of};
 use crate::gltf::{read_gltf, unique_names};
 use crate::material_library::LARGEST_REFLECTANCE;
 use crate::model::Model;
@@ -70,6 +80,7 @@ struct SceneFile {
     camera: Vec<Spanned<CameraEntry>>,
     #[serde(default)]
     light: Vec<Spanned<LightEntry>>,
+    environment: Option<Spanned<EnvironmentEntry>>,
 }
 
 #[derive(Deserialize)]
@@ -169,7 +180,7 @@ enum Axis {
 }
 
 /// Cause and cure.
-type Wrong = (String, &'static str);
+pub(crate) type Wrong = (String, &'static str);
 
 /// Reads a scene file and the models that it names.
 pub(crate) fn read_scene_file(path: &Path, report: &mut ImportReport) -> Result<Model, FormatError> {
@@ -204,6 +215,12 @@ pub(crate) fn read_scene_file(path: &Path, report: &mut ImportReport) -> Result<
     }
     for entry in &file.light {
         scene.lights.push(light(entry.get_ref(), unit).map_err(wrong(entry.span().start))?);
+    }
+    if let Some(entry) = &file.environment {
+        let own_up = if up == Axis::Y { UpAxis::Y } else { UpAxis::Z };
+        let environment =
+            environment_of(entry.get_ref(), path, own_up, report).map_err(wrong(entry.span().start))??;
+        scene.environment = Some(environment);
     }
     cameras.append(&mut scene.cameras);
     unique_names(&mut cameras);
@@ -482,6 +499,7 @@ mod tests {
             .map(|line| format!("{line}\n"))
             .collect();
         let text = example.replace("room.obj", "a.obj").replace("material.wall", "material.paint");
+        let text = text.replace("map =", "# map =").replace("# sky", "sky").replace("# sun", "sun");
         assert_eq!(read(&text).unwrap().scene.cameras[0].name, "door");
     }
 }

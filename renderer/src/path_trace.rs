@@ -2,7 +2,8 @@
 //!
 //! E(x) = E_direct(x) + mean of ρ(y)·E(y) over the points y seen from x in directions spread by their cosine. The
 //! first term is estimated by sampling emitters, the second by following one such direction, at every bounce; so
-//! emission is never counted where a path happens to hit an emitter.
+//! emission is never counted where a path happens to hit an emitter. Light of the scene's environment is estimated by both
+//! ([`crate::sky_light`]), so with an environment one direction is followed for direct light, too.
 //!
 //! At x, the point looked at, the cosine is to the shading normal of its polygon, if that has one, and nothing arrives from below
 //! the polygon's plane ([`Scene::shading_normal`]); at every y it is to the polygon's own normal.
@@ -17,7 +18,8 @@ use scene::{Bvh, Rgb, Scene};
 use crate::{
     emitters::{Emitters, SeenEmitters},
     sequence::{Kronecker, Stream, scatter},
-    surface::{Receiver, SurfacePoint, Surfaces},
+    sky_light::SkyLight,
+    surface::{Receiver, Seen, SurfacePoint, Surfaces},
 };
 
 /// Independent batches that the samples of a point are dealt into. More measure the variance better (this many to
@@ -135,13 +137,14 @@ impl<'a> PathLight<'a> {
 pub(crate) struct PathTracer<'a> {
     pub surfaces: Surfaces<'a>,
     emitters: Emitters,
+    sky: Option<SkyLight<'a>>,
 }
 
 impl<'a> PathTracer<'a> {
     pub fn new(scene: &'a Scene, bvh: &'a Bvh) -> Self {
         let surfaces = Surfaces::new(scene, bvh);
         let emitters = Emitters::new(&surfaces);
-        Self { surfaces, emitters }
+        Self { surfaces, emitters, sky: scene.environment.as_ref().and_then(SkyLight::new) }
     }
 
     /// Irradiance at a receiver; `stream` names the random numbers that are used for it.
@@ -169,18 +172,23 @@ impl<'a> PathTracer<'a> {
     ) -> Rgb {
         let mut on_emitters = Kronecker::<2>::shifted_by(stream);
         let mut first_bounce = Kronecker::<4>::shifted_by(stream);
+        let mut on_sky = self.sky.as_ref().map(|sky| (sky, Kronecker::<2>::shifted_by(stream)));
         let mut sum = Rgb::ZERO;
         for _ in 0..samples {
             sum += self.emitters.irradiance(&self.surfaces, receiver, here, on_emitters.point());
-            if bounces > 0 {
+            if let Some((sky, numbers)) = &mut on_sky {
+                sum += sky.irradiance(&self.surfaces, receiver, numbers.point());
+            }
+            if bounces > 0 || on_sky.is_some() {
                 sum += self.reflected(receiver, bounces, first_bounce.point(), there, stream);
             }
         }
         sum / f64::from(samples)
     }
 
-    /// One sample of the irradiance that reaches a receiver by way of one to `bounces` reflections, W·m⁻². The first
-    /// bounce uses the four numbers given, in 0..1; later ones draw their own.
+    /// One sample of the irradiance that reaches a receiver by way of one to `bounces` reflections, W·m⁻², and what the
+    /// directions followed say of direct light from the environment. The first bounce uses the four numbers given, in 0..1;
+    /// later ones draw their own.
     fn reflected(
         &self,
         receiver: &Receiver,
@@ -192,14 +200,23 @@ impl<'a> PathTracer<'a> {
         let (mut irradiance, mut throughput) = (Rgb::ZERO, Rgb::ONE);
         let mut receiver = *receiver;
         let mut numbers = first_bounce;
-        for _ in 0..bounces {
+        // After the last reflection one direction more is followed, which may meet the environment.
+        let directions = bounces.saturating_add(self.sky.is_some().into());
+        for followed in 0..directions {
             let [u, v, on_emitter @ ..] = numbers;
             let direction = cosine_direction(receiver.cosine, [u, v]);
             // About a shading normal some look below the surface: they count nothing.
             if receiver.cosine != receiver.normal && receiver.normal.dot(direction) <= 0.0 {
                 break;
             }
-            let Some(point) = self.surfaces.seen_from(&receiver, direction) else { break };
+            let point = match (self.surfaces.seen_from(&receiver, direction), &self.sky) {
+                (Seen::Front(point), _) if followed < bounces => point,
+                (Seen::Nothing, Some(sky)) => {
+                    irradiance += throughput * sky.along(&receiver, direction);
+                    break;
+                }
+                _ => break,
+            };
             throughput *= self.surfaces.scene.reflectance(point.polygon);
             receiver = point.into();
             if throughput.max_element() <= 0.0 {
@@ -207,6 +224,10 @@ impl<'a> PathTracer<'a> {
             }
             self.emitters.seen_from(&self.surfaces, &receiver, seen);
             irradiance += throughput * self.emitters.irradiance(&self.surfaces, &receiver, seen, on_emitter);
+            if let Some(sky) = &self.sky {
+                let on_sky = std::array::from_fn(|_| stream.uniform());
+                irradiance += throughput * sky.irradiance(&self.surfaces, &receiver, on_sky);
+            }
             let survival = throughput.max_element().min(LARGEST_SURVIVAL);
             if stream.uniform() >= survival {
                 break;
@@ -231,6 +252,8 @@ pub(crate) mod test_scenes {
 
     use glam::DVec3;
     use scene::{Material, Polygon, Rgb, Scene};
+
+    use super::Estimate;
 
     /// A scene of outlines, each with a material of its own; equal positions are welded.
     pub(crate) fn scene_of(faces: &[(Vec<DVec3>, Material)]) -> Scene {
@@ -266,6 +289,14 @@ pub(crate) mod test_scenes {
         grey(0.0, 0.0)
     }
 
+    /// Checks an estimate against the truth: within 4.5 standard errors (about 1 in 10,000 for Student's t with 31
+    /// degrees), and precise enough for that to mean something.
+    pub(crate) fn assert_estimates(estimate: Estimate, truth: f64, precision: f64) {
+        let (mean, error) = (estimate.mean.x, estimate.standard_error().x);
+        assert!((mean - truth).abs() <= 4.5 * error + 1e-13 * truth, "{mean} ± {error} for {truth}");
+        assert!(error <= precision * truth, "standard error {error} of {mean}");
+    }
+
     /// The six faces of a box, their fronts to the inside.
     pub(crate) fn room(low: DVec3, high: DVec3) -> Vec<Vec<DVec3>> {
         let corner = |i: u32| DVec3::select(glam::BVec3::new(i & 1 > 0, i & 2 > 0, i & 4 > 0), high, low);
@@ -279,7 +310,7 @@ mod tests {
     use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
     use super::{
-        test_scenes::{black, grey, room, scene_of},
+        test_scenes::{assert_estimates, black, grey, room, scene_of},
         *,
     };
 
@@ -294,14 +325,6 @@ mod tests {
     /// A rectangle in the plane z = `z`, its front down.
     fn ceiling(x: [f64; 2], y: [f64; 2], z: f64) -> Vec<DVec3> {
         [(x[0], y[0]), (x[0], y[1]), (x[1], y[1]), (x[1], y[0])].map(|(x, y)| DVec3::new(x, y, z)).to_vec()
-    }
-
-    /// Checks an estimate against the truth: within 4.5 standard errors (about 1 in 10,000 for Student's t with 31
-    /// degrees), and precise enough for that to mean something.
-    fn assert_estimates(estimate: Estimate, truth: f64, precision: f64) {
-        let (mean, error) = (estimate.mean.x, estimate.standard_error().x);
-        assert!((mean - truth).abs() <= 4.5 * error + 1e-13 * truth, "{mean} ± {error} for {truth}");
-        assert!(error <= precision * truth, "standard error {error} of {mean}");
     }
 
     #[test]

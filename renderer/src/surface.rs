@@ -48,6 +48,17 @@ impl Receiver {
     }
 }
 
+/// What a receiver sees in a direction.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Seen {
+    /// Nothing: the ray leaves the scene.
+    Nothing,
+    /// The back of a surface, which is black.
+    Back,
+    /// The front of a surface.
+    Front(SurfacePoint),
+}
+
 /// The surfaces of a scene, as paths need them.
 pub(crate) struct Surfaces<'a> {
     pub scene: &'a Scene,
@@ -57,15 +68,19 @@ pub(crate) struct Surfaces<'a> {
     other_sides: Vec<Option<u32>>,
     /// Lengths up to this are rounding, metres.
     pub rounding: f64,
-    /// Length of the diagonal of the scene's box, metres.
+    /// Middle of the scene's box, metres.
+    middle: DVec3,
+    /// Length of the diagonal of that box, metres.
     pub size: f64,
 }
 
 impl<'a> Surfaces<'a> {
     pub fn new(scene: &'a Scene, bvh: &'a Bvh) -> Self {
         let planes: Vec<_> = scene.polygon_ids().map(|polygon| scene.plane(polygon)).collect();
-        let (other_sides, size) = (other_sides(scene), scene.size());
-        Self { scene, bvh, planes, other_sides, rounding: ROUNDING * size, size }
+        let (low, high) = scene.bounds();
+        let size = (high - low).length();
+        let (rounding, middle) = (ROUNDING * size, (low + high) / 2.0);
+        Self { scene, bvh, planes, other_sides: other_sides(scene), rounding, middle, size }
     }
 
     pub fn plane(&self, polygon: u32) -> Plane {
@@ -112,18 +127,26 @@ impl<'a> Surfaces<'a> {
         if self.plane(hit).normal.dot(direction) < 0.0 { Some(hit) } else { self.other_sides[hit as usize] }
     }
 
-    /// The surface that a receiver sees in a direction: none where the ray leaves the scene or meets a black back.
+    /// Whether a receiver sees nothing in a unit direction, however far it looks.
+    pub fn sees_sky(&self, receiver: &Receiver, direction: DVec3) -> bool {
+        // Farther than from the receiver to any corner of the scene's box.
+        let far = (receiver.position - self.middle).length() + self.size;
+        let stands = |id| !self.is_on(receiver, id);
+        !self.bvh.is_blocked_among(receiver.position, receiver.position + direction * far, stands)
+    }
+
+    /// What a receiver sees in a direction.
     ///
     /// No offset along the ray keeps it off its own surface, since that would see through a contact: a convex polygon
     /// cannot see itself, so hits on the receiver's own polygon are passed over by name.
-    pub fn seen_from(&self, receiver: &Receiver, direction: DVec3) -> Option<SurfacePoint> {
+    pub fn seen_from(&self, receiver: &Receiver, direction: DVec3) -> Seen {
         let ray = Ray { origin: receiver.position, direction };
-        let hit = self.bvh.closest_hit_among(&ray, |id| !self.is_on(receiver, id))?;
-        let polygon = self.facing(hit.id, direction)?;
+        let Some(hit) = self.bvh.closest_hit_among(&ray, |id| !self.is_on(receiver, id)) else { return Seen::Nothing };
+        let Some(polygon) = self.facing(hit.id, direction) else { return Seen::Back };
         let plane = self.plane(polygon);
         let position = ray.at(hit.distance);
         let position = position - plane.normal * plane.distance(position);
-        Some(SurfacePoint { position, normal: plane.normal, polygon })
+        Seen::Front(SurfacePoint { position, normal: plane.normal, polygon })
     }
 }
 
@@ -233,11 +256,12 @@ mod tests {
         let bvh = Bvh::of_scene(&scene);
         let surfaces = Surfaces::new(&scene, &bvh);
         let floor = surfaces.receiver_at(DVec3::new(0.4, 0.3, 0.0), DVec3::Z);
-        let seen = surfaces.seen_from(&floor, DVec3::new(0.1, 0.2, 1.0).normalize()).expect("the underside");
-        assert_eq!(seen.polygon, 2);
+        let seen = surfaces.seen_from(&floor, DVec3::new(0.1, 0.2, 1.0).normalize());
+        assert!(matches!(seen, Seen::Front(point) if point.polygon == 2), "the underside");
         // From the upper side nothing is in the way, not even the lower one.
         let top = surfaces.receiver_at(DVec3::new(0.4, 0.3, 1.0), DVec3::Z);
         assert_eq!(top.polygon, Some(1));
-        assert_eq!(surfaces.seen_from(&top, DVec3::Z), None);
+        assert_eq!(surfaces.seen_from(&top, DVec3::Z), Seen::Nothing);
+        assert!(surfaces.sees_sky(&top, DVec3::Z) && !surfaces.sees_sky(&floor, DVec3::Z));
     }
 }

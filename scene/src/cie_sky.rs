@@ -4,7 +4,7 @@
 //! gradation from zenith to horizon and an indicatrix about the sun, and as a sixteenth sky the traditional overcast one of
 //! Moon and Spencer 1942.
 
-use std::f64::consts::FRAC_PI_2;
+use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
 
 use serde::{Deserialize, Serialize};
 
@@ -42,6 +42,10 @@ pub struct CieSky {
 }
 
 impl CieSky {
+    /// Where the sun stands if nothing is said: in the south-east, half-way up. Radians clockwise from north, and above the
+    /// horizon.
+    pub const DEFAULT_SUN: [f64; 2] = [3.0 * FRAC_PI_4, FRAC_PI_4];
+
     /// The sky of a number, 1..=16, with the sun at an azimuth (radians clockwise from north) and an altitude (radians over the
     /// horizon, 0..=π/2), which by itself sends so much to a surface that faces it, W·m⁻². None if a number is out of its
     /// range.
@@ -57,6 +61,11 @@ impl CieSky {
             && azimuth.is_finite()
             && (0.0..=FRAC_PI_2).contains(&altitude)
             && (0.0..f64::INFINITY).contains(&self.sun_irradiance)
+    }
+
+    /// Its number, 1..=16.
+    pub fn kind(&self) -> u8 {
+        self.kind
     }
 
     /// Where the sun stands: radians clockwise from north, and above the horizon.

@@ -11,6 +11,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::{CieSky, Rgb};
 
+/// Angular radius of the sun's disc, radians: half of 0.533°, the mean over a year. Its radiance is even over the disc.
+pub const SUN_RADIUS: f64 = 0.533 / 2.0 * PI / 180.0;
+
 /// The axis of the scene that points up in an environment.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum UpAxis {
@@ -92,6 +95,15 @@ impl Environment {
             Sky::Cie(sky) => sky.is_valid(),
         };
         is_sky && self.rotation.is_finite() && self.scale.is_finite() && self.scale >= 0.0
+    }
+
+    /// Whether no light comes from anywhere.
+    pub fn is_black(&self) -> bool {
+        let is_black = match &self.sky {
+            Sky::Map(map) => map.texels.iter().all(|texel| *texel == Vec3::ZERO),
+            Sky::Cie(_) => false,
+        };
+        is_black || self.scale == 0.0
     }
 
     /// The unit direction of a place in the picture.
@@ -205,6 +217,15 @@ mod tests {
         }
         let empty = Sky::Map(LatLongMap { width: 0, height: 3, texels: vec![] });
         assert!(!Environment { sky: empty, ..sound }.is_valid());
+    }
+
+    #[test]
+    fn black_is_what_sends_no_light() {
+        assert!(map(1, 1).is_black() && !map(2, 1).is_black());
+        assert!(Environment { scale: 0.0, ..map(2, 1) }.is_black());
+        let sky = Sky::Cie(CieSky::new(1, CieSky::DEFAULT_SUN, 0.0).unwrap());
+        assert!(!Environment { sky: sky.clone(), ..map(1, 1) }.is_black());
+        assert!(Environment { sky, scale: 0.0, ..map(1, 1) }.is_black());
     }
 
     #[test]

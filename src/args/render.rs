@@ -14,6 +14,10 @@ const SUPERSAMPLE: u32 = 3;
 
 /// `halflight render`.
 #[derive(Debug, Args)]
+#[command(mut_arg("environment", |environment| environment.conflicts_with_all([
+    "sampler", "radiance", "paths", "bounces", "budget", "level", "interval", "perceptual", "rule", "filter", "interpolation", "snapshots",
+    "sample_map", "seed",
+])))]
 pub struct RenderFlags {
     /// Scene, or a bake
     #[arg(value_name = "SCENE|OUT.hlf")]
@@ -42,7 +46,7 @@ pub struct RenderFlags {
     /// What a sample sees
     #[command(flatten)]
     pub radiance: RadianceFlags,
-    /// The sky, where it is what lights the scene
+    /// How a picture is made under --environment
     #[command(flatten)]
     pub sky: SkyFlags,
     /// How much is done: samples a pixel (1.9rpp, or a bare number), seconds (30s), or samples as a share of the pixels (6%);

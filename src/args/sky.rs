@@ -1,27 +1,19 @@
-//! The flags of `halflight render --environment`.
+//! The flags of `halflight render --environment`: a picture by lights that stand for the environment.
 
 use std::path::PathBuf;
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 use renderer::{SkySampling, Visibility};
-use scene::{CIE_SKIES, UpAxis};
 
-use super::{non_negative, number, png_path, positive};
+use super::{number, png_path};
 
 /// Most lights: more than a picture tells apart.
 const MOST_LIGHTS: i64 = 4096;
 
-/// Light from the sky.
+/// How a picture is made under an environment.
 #[derive(Clone, Debug, Args)]
 pub struct SkyFlags {
-    /// Light the scene by the sky alone, a ray from each pixel's middle: a picture of all directions (.hdr, .exr), or a general
-    /// sky of the CIE, cie:1 to cie:16
-    #[arg(long, value_name = "MAP|cie:N", value_parser = source, conflicts_with_all = [
-        "sampler", "radiance", "paths", "bounces", "budget", "level", "interval", "perceptual", "rule", "filter", "interpolation", "snapshots",
-        "sample_map", "seed",
-    ])]
-    pub environment: Option<SkySource>,
     /// Lights that stand for the environment
     #[arg(long, value_name = "N", default_value_t = 200, value_parser = clap::value_parser!(u32).range(1..=MOST_LIGHTS), requires = "environment", allow_negative_numbers = true)]
     pub lights: u32,
@@ -39,22 +31,6 @@ pub struct SkyFlags {
     /// Part of an unobstructed pixel's light that may be guessed: the faintest of the lights that are in doubt are not traced
     #[arg(long, value_name = "F", default_value_t = 0.0, value_parser = share, requires = "environment", allow_hyphen_values = true)]
     pub guessed: f64,
-    /// How far the sky is turned clockwise, seen from above, degrees
-    #[arg(long, value_name = "DEG", default_value_t = 0.0, value_parser = number, requires = "environment", allow_hyphen_values = true)]
-    pub sky_rotation: f64,
-    /// What the sky's light is multiplied by; the zenith of a CIE sky has 1 W/(sr m²)
-    #[arg(long, value_name = "F", default_value_t = 1.0, value_parser = positive, requires = "environment", allow_hyphen_values = true)]
-    pub sky_scale: f64,
-    /// The axis of the scene that points up under the sky
-    #[arg(long, default_value = "z", value_parser = up_axis(), requires = "environment")]
-    pub sky_up: UpAxis,
-    /// Where the sun stands in a CIE sky: degrees clockwise from north, which is y where z is up, and over the horizon
-    /// [default: 135,45]
-    #[arg(long, value_name = "AZIMUTH,ALTITUDE", value_parser = sun, requires = "environment", allow_hyphen_values = true)]
-    pub sun: Option<[f64; 2]>,
-    /// What the sun itself sends to a surface that faces it in a CIE sky, W/m², before --sky-scale [default: nothing]
-    #[arg(long, value_name = "E", value_parser = non_negative, requires = "environment", allow_hyphen_values = true)]
-    pub sun_irradiance: Option<f64>,
     /// Trace every shadow ray as well, and count the predictions that are wrong
     #[arg(long, requires = "environment")]
     pub check: bool,
@@ -65,24 +41,6 @@ pub struct SkyFlags {
     /// Where a picture of the sky goes, with the lights and the cells of directions that they stand for
     #[arg(long, value_name = "FILE.png", value_parser = png_path, requires = "environment")]
     pub sky_picture: Option<PathBuf>,
-}
-
-/// Where an environment comes from.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum SkySource {
-    /// A picture.
-    Map(PathBuf),
-    /// A sky of the CIE, by its number.
-    Cie(u8),
-}
-
-impl std::fmt::Display for SkySource {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self {
-            Self::Map(path) => write!(f, "{}", path.display()),
-            Self::Cie(kind) => write!(f, "cie:{kind}"),
-        }
-    }
 }
 
 /// How lights are placed.
@@ -124,26 +82,4 @@ fn visibility() -> impl TypedValueParser<Value = NamedVisibility> {
 fn share(text: &str) -> Result<f64, String> {
     let value = number(text)?;
     if (0.0..1.0).contains(&value) { Ok(value) } else { Err("must be 0 or more and less than 1, such as 0.01".into()) }
-}
-
-fn up_axis() -> impl TypedValueParser<Value = UpAxis> {
-    let named = |text: String| UpAxis::ALL.into_iter().find(|axis| axis.name() == text).ok_or("no such axis");
-    PossibleValuesParser::new(UpAxis::ALL.map(UpAxis::name)).try_map(named)
-}
-
-fn source(text: &str) -> Result<SkySource, String> {
-    let Some(kind) = text.strip_prefix("cie:") else { return Ok(SkySource::Map(text.into())) };
-    match kind.parse() {
-        Ok(kind) if (1..=CIE_SKIES).contains(&kind) => Ok(SkySource::Cie(kind)),
-        _ => Err(format!("the skies of the CIE are cie:1 to cie:{CIE_SKIES}")),
-    }
-}
-
-/// Azimuth and altitude, radians.
-fn sun(text: &str) -> Result<[f64; 2], String> {
-    let numbers: Vec<f64> = text.split(',').map(number).collect::<Result<_, _>>()?;
-    match numbers[..] {
-        [azimuth, altitude] if (0.0..=90.0).contains(&altitude) => Ok([azimuth.to_radians(), altitude.to_radians()]),
-        _ => Err("must be an azimuth and an altitude from 0 to 90 in degrees, such as 135,45".into()),
-    }
 }

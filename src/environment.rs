@@ -1,0 +1,29 @@
+//! The environment that flags name: as part of a scene that is read, or for a picture of its own.
+
+use anyhow::{Context, Result, bail};
+use scene::{CieSky, Environment, Sky};
+
+use crate::args::{EnvironmentFlags, SkySource};
+use crate::failure::Usage;
+
+/// The environment of a source, and in words what is odd about it; a map has all texels of its file.
+pub fn environment(flags: &EnvironmentFlags, source: &SkySource) -> Result<(Environment, Vec<String>)> {
+    let (sky, warnings) = match source {
+        SkySource::Cie(kind) => {
+            let sun = flags.sun.unwrap_or(CieSky::DEFAULT_SUN);
+            let sky = CieSky::new(*kind, sun, flags.sun_irradiance.unwrap_or(0.0));
+            (Sky::Cie(sky.context("the sun is nowhere")?), Vec::new())
+        }
+        SkySource::Map(path) => {
+            if flags.sun.is_some() || flags.sun_irradiance.is_some() {
+                bail!(Usage(
+                    "--sun: a map has its own; leave --sun and --sun-irradiance out, or give cie:1 to cie:16".into()
+                ));
+            }
+            let read = formats::read_environment(path)?;
+            (Sky::Map(read.map), read.warnings)
+        }
+    };
+    let (up, rotation, scale) = (flags.sky_up, flags.sky_rotation.to_radians(), flags.sky_scale);
+    Ok((Environment { sky, up, rotation, scale }, warnings))
+}
