@@ -10,13 +10,13 @@ use std::cell::OnceCell;
 use std::f64::consts::PI;
 
 use glam::{DVec2, DVec3};
-use scene::{Plane, Rgb, Scene, luminance};
+use scene::{Plane, Rgb, Scene, area_vector, luminance};
 
 use crate::Gather;
 use crate::backprojection::{Fragments, SLIVER, Viewpoint};
 use crate::clip::clip_convex;
 use crate::form_factor::point_form_factor;
-use crate::lattice::{Fan, STEP, hemisphere, shift, spread};
+use crate::lattice::{Fan, hemisphere, shift, spread};
 use crate::leaf_gather::{Cones, LeafGather, Obstacle};
 use crate::light_tree::Horizon;
 use crate::openings::{BEYOND, SeenCell};
@@ -40,6 +40,9 @@ const MOST_INHERITED: usize = 48;
 /// too many of them, and each is looked at once.
 const SHORT: f64 = 0.01;
 
+/// Their points have this part of the rays: there are many, and what each is off by is lost among them.
+const SHORT_PART: u32 = 2;
+
 /// What is taken to be unsure at least of a cell that all or no places see. Less lets rays miss what they were not told of.
 const UNSURE: f64 = 0.15;
 
@@ -55,6 +58,8 @@ pub(crate) struct SkyView {
     cells: Vec<DoubtfulCell>,
     /// Cells without parts that rays tell of.
     by_rays: Vec<SeenCell>,
+    /// Whether the element is short and has no shafts.
+    is_short: bool,
 }
 
 /// A cell that something may stand before, or that the horizon cuts.
@@ -98,6 +103,7 @@ impl Gather<'_> {
             let up = horizon.plane.normal;
             let rises = |seen: &&SeenCell| sky.cells[seen.cell as usize].corners.iter().any(|way| up.dot(*way) > 0.0);
             view.by_rays = seen.iter().filter(rises).copied().collect();
+            view.is_short = true;
             return view;
         }
         let polygon = elements.polygon_of(element).unwrap_or_default();
@@ -164,7 +170,7 @@ impl LeafGather<'_> {
         for doubtful in &self.sky.cells {
             total += self.light_of_cell(doubtful, from, cones, fragments);
         }
-        total + self.light_by_rays(from, fragments)
+        total + self.light_by_rays(from)
     }
 
     /// Irradiance from what a point sees of a cell, W·m⁻².
@@ -225,40 +231,54 @@ impl LeafGather<'_> {
         parts.clone().map(light_of_part).sum()
     }
 
-    /// Irradiance from the cells that rays tell of, W·m⁻².
-    fn light_by_rays(&self, from: &Viewpoint, fragments: &mut Fragments) -> Rgb {
+    /// Irradiance from the cells that rays tell of, W·m⁻²: each ray goes to a cell as often as that is in doubt, and counts for as
+    /// much as it stands for.
+    fn light_by_rays(&self, from: &Viewpoint) -> Rgb {
         let gather = self.gather;
-        let reach = BEYOND * gather.geometry.size;
-        let origin = from.aside(ASIDE * gather.geometry.size);
-        let (rays, turn) = gather.sampling();
-        let first = shift(from.position, turn);
-        let cells = || self.sky.by_rays.iter().map(|seen| (seen, &gather.solution.sky.cells[seen.cell as usize]));
-        let doubt = |(seen, cell): (&SeenCell, &SkyCell)| {
+        let doubt = |seen: &SeenCell| {
+            let cell = &gather.solution.sky.cells[seen.cell as usize];
             let most = Rgb::from_array(cell.light.map(|light| light.dot(from.normal).max(0.0)));
             let share = f64::from(seen.share);
             luminance(most) * (share * (1.0 - share)).sqrt().max(UNSURE)
         };
-        let total: f64 = cells().map(doubt).sum();
-        if total <= 0.0 {
+        let mut sum = 0.0;
+        let sums: Vec<f64> = self
+            .sky
+            .by_rays
+            .iter()
+            .map(|seen| {
+                sum += doubt(seen);
+                sum
+            })
+            .collect();
+        if sum <= 0.0 {
             return Rgb::ZERO;
         }
-        let rays = f64::from(rays) / total;
-        let light = |(number, (seen, cell)): (usize, (&SeenCell, &SkyCell))| {
-            fragments.start(&cell.corners, from);
-            let unoccluded = fragments.measure(from.normal);
-            if unoccluded == 0.0 {
+        let (rays, turn) = gather.sampling();
+        let rays = if self.sky.is_short { rays.div_ceil(SHORT_PART) } else { rays };
+        let origin = from.aside(ASIDE * gather.geometry.size);
+        let first = shift(from.position, turn);
+        let passes = |polygon: u32| !origin.may_meet(gather.geometry.outline(polygon));
+        let reach = BEYOND * gather.geometry.size;
+        let light = |ray: u32| {
+            let wanted = (f64::from(ray) + first.x) / f64::from(rays) * sum;
+            let place = sums.partition_point(|&sum| sum <= wanted).min(sums.len() - 1);
+            let chance = (sums[place] - place.checked_sub(1).map_or(0.0, |before| sums[before])) / sum;
+            let cell = &gather.solution.sky.cells[self.sky.by_rays[place].cell as usize];
+            let way = Fan::new(&cell.corners).place(first, ray);
+            let height = origin.height(way);
+            if chance <= 0.0
+                || height == 0.0
+                || gather.tree.is_blocked(self.polygon, origin.position, origin.position + way * reach, passes)
+            {
                 return Rgb::ZERO;
             }
-            let rays = (rays * doubt((seen, cell))).ceil().max(1.0) as u32;
-            let outline: Vec<DVec3> = cell.corners.iter().map(|way| origin.position + *way * reach).collect();
-            let is_blocked = |place| {
-                let passes = |polygon| !origin.may_meet(gather.geometry.outline(polygon));
-                gather.tree.is_blocked(self.polygon, origin.position, place, passes)
-            };
-            let shift = first + STEP * number as f64;
-            cell.exitance * (unoccluded * Fan::new(&outline).arriving(&origin, (shift, rays), is_blocked).share)
+            // A part of the cell's plane, seen from a distance of 1 to it, for the part of the directions.
+            let square = way.length_squared();
+            let area = area_vector(&cell.corners);
+            cell.exitance * (height * area.dot(way).abs() / (PI * square * square * chance))
         };
-        cells().enumerate().map(light).sum()
+        (0..rays).map(light).sum::<Rgb>() / f64::from(rays)
     }
 }
 
