@@ -26,7 +26,7 @@ pub struct Discontinuity {
     pub kind: LineKind,
     /// Receiving polygon.
     pub receiver: u32,
-    /// Source polygon.
+    /// Source: a polygon, or what [`Interaction::source`] has for others.
     pub source: u32,
     /// Polygon whose edge or vertex is grazed, that of smaller id where two share it; the source for a horizon line.
     pub blocker: u32,
@@ -75,7 +75,9 @@ pub(crate) fn discontinuities_within(
 ) -> Vec<Discontinuity> {
     let count = scene.polygons.len() as u32;
     let exists = |interaction: &Interaction| {
-        interaction.source.max(receiver) < count && interaction.blockers.iter().all(|&blocker| blocker < count)
+        (interaction.source < count || interaction.far_outline.is_some())
+            && receiver < count
+            && interaction.blockers.iter().all(|&blocker| blocker < count)
     };
     let interactions: Vec<&Interaction> = interactions.iter().filter(|interaction| exists(interaction)).collect();
     if interactions.is_empty() {
@@ -95,7 +97,10 @@ pub(crate) fn discontinuities_within(
     };
     for interaction in interactions {
         if let Some(case) = search.case(interaction) {
-            search.horizon(&case);
+            // One that is far away has its horizon where the receiver's plane is: nowhere on it.
+            if interaction.far_outline.is_none() {
+                search.horizon(&case);
+            }
             search.vertex_edge(&case);
             search.edge_vertex(&case);
         }

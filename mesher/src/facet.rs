@@ -34,6 +34,8 @@ pub(crate) struct Facets<'a> {
     /// By polygon, its place in the table: no more than what is named, so that many receivers of a large scene can be searched.
     slots: HashMap<u32, u32>,
     facets: Vec<Facet>,
+    /// Corners of sources that are no polygons.
+    far_outlines: HashMap<u32, &'a [DVec3]>,
     /// Length below which two points are one, metres.
     pub(crate) tolerance: f64,
     /// (vertex, half-edge that starts there) of all blockers, ascending.
@@ -46,11 +48,14 @@ impl<'a> Facets<'a> {
         scene: &'a Scene,
         half_edges: &'a HalfEdges,
         (receiver, outline): (u32, &[DVec3]),
-        interactions: &[&Interaction],
+        interactions: &[&'a Interaction],
     ) -> Self {
         let tolerance = TOLERANCE * scene.size();
         let slots = HashMap::new();
-        let mut table = Self { scene, half_edges, slots, facets: Vec::new(), tolerance, fans: Vec::new() };
+        let far = |interaction: &&'a Interaction| Some((interaction.source, interaction.far_outline.as_deref()?));
+        let far_outlines = interactions.iter().filter_map(far).collect();
+        let mut table =
+            Self { scene, half_edges, slots, facets: Vec::new(), far_outlines, tolerance, fans: Vec::new() };
         let target = Target::new(outline);
         table.add(receiver, &target);
         for interaction in interactions {
@@ -79,7 +84,7 @@ impl<'a> Facets<'a> {
         if *self.slots.entry(polygon).or_insert(slot) != slot {
             return false;
         }
-        let outline = self.scene.outline(polygon);
+        let outline: Vec<DVec3> = self.corners(polygon).collect();
         let centre = centroid(&outline);
         let radius = outline.iter().map(|corner| corner.distance(centre)).fold(0.0, f64::max);
         let clearance = target.clearance(&outline, self.tolerance);
@@ -99,10 +104,13 @@ impl<'a> Facets<'a> {
         &self.fans[first..first + count]
     }
 
-    /// Corner positions of a polygon.
+    /// Corner positions of a polygon, or of a source that is none.
     pub(crate) fn corners(&self, polygon: u32) -> impl Iterator<Item = DVec3> + Clone {
-        let corners = &self.scene.corners[self.scene.polygons[polygon as usize].corner_range()];
-        corners.iter().map(|&vertex| self.scene.vertices[vertex as usize])
+        let far = self.far_outlines.get(&polygon).copied();
+        let record = if far.is_some() { None } else { self.scene.polygons.get(polygon as usize) };
+        let corners = record.map_or(&[][..], |record| &self.scene.corners[record.corner_range()]);
+        let vertices = corners.iter().map(|&vertex| self.scene.vertices[vertex as usize]);
+        far.unwrap_or_default().iter().copied().chain(vertices)
     }
 
     /// The half-edges around a polygon.

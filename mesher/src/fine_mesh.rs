@@ -8,7 +8,7 @@ use std::sync::{Mutex, PoisonError};
 
 use glam::DVec3;
 use rayon::prelude::*;
-use scene::{DiscontinuityLine, Rgb, Scene};
+use scene::{DiscontinuityLine, Rgb, SKY, Scene};
 use solver::{Cosine, Gather, NodeId, Shafts, Solution};
 
 use crate::guess::guessed_emitted;
@@ -200,7 +200,7 @@ fn divided_leaves(
         DiscontinuityLine {
             kind: line.kind,
             receiver: line.receiver,
-            source: line.source,
+            source: if (line.source as usize) < scene.polygons.len() { line.source } else { SKY },
             blocker: line.blocker,
             weight: line.weight as f32,
             ends: line.ends.map(|end| end.as_vec3()),

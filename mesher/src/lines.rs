@@ -152,7 +152,12 @@ mod tests {
         let scene = plate_over_floor();
         let mut solution = solve(&scene, &SolveOptions::default(), &|_| ());
         let half_edges = HalfEdges::new(&scene);
-        let interaction = solver::Interaction { source: 1, radiosity: 100.0 * std::f64::consts::PI, blockers: vec![2] };
+        let interaction = solver::Interaction {
+            source: 1,
+            far_outline: None,
+            radiosity: 100.0 * std::f64::consts::PI,
+            blockers: vec![2],
+        };
         let whole = discontinuities(&scene, &half_edges, 0, &[interaction], Weight::Ratio, 0.0);
         let ranked = |outline: &[DVec3], all: &[Discontinuity], candidates: Vec<u32>| {
             rank(&scene, outline, all, candidates, Weight::Ratio, usize::MAX)

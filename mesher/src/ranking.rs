@@ -224,8 +224,8 @@ mod tests {
         let light = rectangle((0.2, 0.2), (0.4, 0.4), 2.0, true);
         let scene = welded(&[leaf(), light, rectangle((0.4, 0.4), (0.6, 0.6), 0.5, false), wall]);
         let interactions = [
-            Interaction { source: 1, radiosity: 30.0, blockers: vec![2] },
-            Interaction { source: 3, radiosity: 1.0, blockers: vec![] },
+            Interaction { source: 1, far_outline: None, radiosity: 30.0, blockers: vec![2] },
+            Interaction { source: 3, far_outline: None, radiosity: 1.0, blockers: vec![] },
         ];
         let lines = discontinuities(&scene, &HalfEdges::new(&scene), 0, &interactions, Weight::Ratio, 0.0);
         let kept = rank(&scene, &leaf(), &lines, 0..lines.len() as u32, Weight::Ratio, 100);

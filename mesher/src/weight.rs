@@ -327,7 +327,7 @@ mod tests {
             let lamp = rectangle((drift - half, -half), (drift + half, half), height, true);
             let plate = rectangle((0.0, -4.0), (5.0, 4.0), lift * height, false);
             let scene = welded(&[rectangle((-1.5, -0.5), (1.5, 0.5), 0.0, false), lamp, plate]);
-            let interaction = Interaction { source: 1, radiosity: 7.0, blockers: vec![2] };
+            let interaction = Interaction { source: 1, far_outline: None, radiosity: 7.0, blockers: vec![2] };
             let half_edges = HalfEdges::new(&scene);
             let found = discontinuities(&scene, &half_edges, 0, &[interaction], Weight::Change, 0.0);
             assert!(!found.is_empty());

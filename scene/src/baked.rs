@@ -80,6 +80,9 @@ pub enum LineKind {
     VertexEdge,
 }
 
+/// In place of a line's source polygon: a small bright part of the sky.
+pub const SKY: u32 = u32::MAX;
+
 /// A discontinuity that was kept.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct DiscontinuityLine {
@@ -87,7 +90,7 @@ pub struct DiscontinuityLine {
     pub kind: LineKind,
     /// Receiving polygon.
     pub receiver: u32,
-    /// Source polygon.
+    /// Source polygon, or [`SKY`].
     pub source: u32,
     /// Blocking polygon; the source itself for a horizon line.
     pub blocker: u32,
@@ -200,7 +203,8 @@ impl Baked {
             }
         }
         for (i, line) in self.lines.iter().enumerate() {
-            if line.receiver.max(line.source).max(line.blocker) >= polygons {
+            let is_source = line.source < polygons || line.source == SKY;
+            if line.receiver.max(line.blocker) >= polygons || !is_source {
                 return index("discontinuity", i);
             }
             if !line.weight.is_finite() || !line.ends.iter().all(|end| end.is_finite()) {

@@ -26,7 +26,9 @@ mod texture_map;
 mod unfinished;
 mod weld;
 
-pub use baked::{Baked, BakedElement, BakedError, BakedTriangle, DiscontinuityLine, EdgeKind, LineKind, Provenance};
+pub use baked::{
+    Baked, BakedElement, BakedError, BakedTriangle, DiscontinuityLine, EdgeKind, LineKind, Provenance, SKY,
+};
 pub use bvh::{Bvh, Hit};
 pub use camera::{Camera, NamedCamera};
 pub use camera_path::{CameraKey, CameraPath, CameraPathError};

@@ -51,8 +51,9 @@ impl<'a> Gather<'a> {
         }
     }
 
-    /// The emitting polygons that shine strongly on an element, if nothing hides them, each with what stands in the shaft between
-    /// the two. Not those of bodies, which are round for the most part, nor those that too much stands before.
+    /// The emitting polygons, and small cells of the sky, that shine strongly on an element, if nothing hides them, each with what
+    /// stands in the shaft between the two. Not those of bodies, which are round for the most part, nor those that too much
+    /// stands before.
     pub fn strong_emitters(&self, element: NodeId, shafts: &mut Shafts) -> Vec<Interaction> {
         let leaf = self.over_shafts(element, shafts);
         let normal = self.geometry.plane(leaf.polygon).normal;
@@ -62,11 +63,13 @@ impl<'a> Gather<'a> {
             let form_factor = form_factor_at(leaf.centre, normal, self.geometry.outline(source.polygon));
             (form_factor * radiosity >= STRONG * self.budget()).then_some(Interaction {
                 source: source.polygon,
+                far_outline: None,
                 radiosity,
                 blockers,
             })
         };
-        leaf.sources.into_iter().filter_map(strong).collect()
+        let small_cells = leaf.small_cells(normal, STRONG * self.budget());
+        leaf.sources.into_iter().filter_map(strong).chain(small_cells).collect()
     }
 
     /// A gather whose sources are all emitters that an element faces, each with what stands in the shaft between the two.

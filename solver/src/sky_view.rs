@@ -23,11 +23,17 @@ use crate::openings::{BEYOND, SeenCell};
 use crate::polygon_tree::{PolygonTree, Stands};
 use crate::ray_gather::ASIDE;
 use crate::visibility::{Occlusion, Shaft};
-use crate::{NodeId, SkyCell, Solution};
+use crate::{Interaction, NodeId, SkyCell, Solution};
 
 /// How far away the sky is taken to be where a shaft leads to it, in sizes of the scene: what a parallax of a millionth may
 /// hide is less than what welding moves.
 const FAR: f64 = 1e6;
+
+/// The same where a cell is a source of lines: these are drawn, and need not be proved.
+const FAR_SOURCE: f64 = 1e4;
+
+/// Angle, radians, up to which a cell is small: its shadows have borders narrower than that part of the way to what casts them.
+const SMALL: f64 = 0.03;
 
 /// Polygons before a cell with parts, at most, for which all of it is looked at at once: what is seen of it is then cut along its
 /// parts. More has every point project what hides nothing of most parts, less has it look at more cells.
@@ -171,6 +177,26 @@ impl LeafGather<'_> {
             total += self.light_of_cell(doubtful, from, cones, fragments);
         }
         total + self.light_by_rays(from)
+    }
+
+    /// The cells that something stands before and that are small enough to cast sharp shadows, if they send at least so much to a
+    /// surface with a normal, luminance, W·m⁻².
+    pub(crate) fn small_cells(&self, normal: DVec3, least: f64) -> Vec<Interaction> {
+        let Gather { geometry, solution, .. } = self.gather;
+        let interaction = |doubtful: &DoubtfulCell| {
+            let SkyCell { corners, exitance, light, parts } = &solution.sky.cells[doubtful.cell as usize];
+            let irradiance = luminance(Rgb::from_array(light.map(|light| light.dot(normal))));
+            let wide = corners.iter().map(|corner| corner.angle_between(corners[0])).fold(0.0, f64::max);
+            let casts = parts.is_empty() && wide <= SMALL && irradiance >= least && !doubtful.blockers.is_empty();
+            let far = |way: &DVec3| self.centre + *way * (FAR_SOURCE * geometry.size);
+            casts.then(|| Interaction {
+                source: u32::MAX - doubtful.cell,
+                far_outline: Some(corners.iter().map(far).collect()),
+                radiosity: luminance(*exitance),
+                blockers: doubtful.blockers.clone(),
+            })
+        };
+        self.sky.cells.iter().filter_map(interaction).collect()
     }
 
     /// Irradiance from what a point sees of a cell, W·m⁻².

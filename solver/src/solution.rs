@@ -91,8 +91,11 @@ pub struct Cut {
 /// Everything that is known of one source's light on one receiving polygon, over all their links.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Interaction {
-    /// Source polygon.
+    /// Source polygon; of a source that is none a number beyond those of all polygons, the same for the same source.
     pub source: u32,
+    /// Corners of a source that is no polygon, metres, counter-clockwise from its front: so far away that the way to it is the same
+    /// from all of the receiver.
+    pub far_outline: Option<Vec<DVec3>>,
     /// Largest luminance of the source's radiosity over its linked elements, W·m⁻².
     pub radiosity: f64,
     /// Polygons that may stand between some point of the receiver and some point of the source, ascending.
@@ -277,7 +280,12 @@ impl Solution {
             .map(|(source, radiosity)| {
                 let first = pairs.partition_point(|pair| pair.0 < source);
                 let end = pairs.partition_point(|pair| pair.0 <= source);
-                Interaction { source, radiosity, blockers: pairs[first..end].iter().map(|pair| pair.1).collect() }
+                Interaction {
+                    source,
+                    far_outline: None,
+                    radiosity,
+                    blockers: pairs[first..end].iter().map(|pair| pair.1).collect(),
+                }
             })
             .collect()
     }

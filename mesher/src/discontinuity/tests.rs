@@ -59,7 +59,7 @@ fn search(outlines: &[Vec<DVec3>]) -> Vec<Discontinuity> {
 fn search_above(outlines: &[Vec<DVec3>], measure: Weight, min_weight: f64) -> Vec<Discontinuity> {
     let scene = welded(outlines);
     let blockers = (2..outlines.len() as u32).collect();
-    let interactions = [Interaction { source: 1, radiosity: 1.0, blockers }];
+    let interactions = [Interaction { source: 1, far_outline: None, radiosity: 1.0, blockers }];
     discontinuities(&scene, &HalfEdges::new(&scene), 0, &interactions, measure, min_weight)
 }
 
@@ -91,7 +91,12 @@ fn degenerate_input_has_no_discontinuities() {
     let light = rectangle((-1.0, -1.0), (1.0, 1.0), 2.0, true);
     let scene = welded(&[floor(), light.clone(), rectangle((-0.5, -0.5), (0.5, 0.5), 1.0, false)]);
     let half_edges = HalfEdges::new(&scene);
-    let interaction = |source, blockers: &[u32]| Interaction { source, radiosity: 1.0, blockers: blockers.to_vec() };
+    let interaction = |source, blockers: &[u32]| Interaction {
+        source,
+        far_outline: None,
+        radiosity: 1.0,
+        blockers: blockers.to_vec(),
+    };
     let count = |receiver, interaction| {
         discontinuities(&scene, &half_edges, receiver, &[interaction], Weight::Ratio, 0.0).len()
     };
@@ -327,7 +332,7 @@ fn an_edge_counts_when_only_one_of_its_faces_is_listed() {
     let scene = welded(&[floor(), rectangle((1.0, -0.2), (1.2, 0.2), 0.8, true), slope(-0.3), right]);
     let half_edges = HalfEdges::new(&scene);
     let on_ridge = |blockers: Vec<u32>| {
-        let interactions = [Interaction { source: 1, radiosity: 1.0, blockers }];
+        let interactions = [Interaction { source: 1, far_outline: None, radiosity: 1.0, blockers }];
         let found = discontinuities(&scene, &half_edges, 0, &interactions, Weight::Ratio, 0.0);
         let grazes = |line: &&Discontinuity| line.rays.iter().all(|ray| ray.blocker.x == 0.0 && ray.blocker.z == 0.6);
         let is_swath = |line: &&Discontinuity| line.kind == LineKind::VertexEdge && grazes(line);
