@@ -132,3 +132,29 @@ fn paths_see_the_environment() {
         );
     }
 }
+
+/// Where a pixel sees no surface: by every sampler, by paths and by Whitted's rays, and by the lights of `render --environment`.
+#[test]
+fn pictures_show_the_environment_past_all_surfaces() {
+    let folder = folder();
+    let picture = folder.path().join("seen.exr");
+    formats::write_exr(&folder.path().join("sides.exr"), 2, 1, &[Vec3::X, Vec3::Y]).unwrap();
+    let scene = floor_under(folder.path(), "map = \"sides.exr\"\nscale = 2");
+    let sky = text(&folder.path().join("sides.exr")).to_owned();
+    // From above, north up: west is left.
+    let view = ["--eye", "0.5,0.5,1", "--target", "0.5,0.5,0", "--up", "0,1,0", "--fov", "100", "--size", "60x60"];
+    for (options, scale) in [
+        (&["--radiance", "path", "--sampler", "full", "--filter", "box"][..], 2.0),
+        (&["--radiance", "path", "--paths", "1", "--filter", "box"], 2.0),
+        (&["--radiance", "whitted", "--filter", "box"], 2.0),
+        (&["--radiance", "whitted", "--sampler", "coherence-map", "--budget", "100%", "--filter", "box"], 2.0),
+        (&["--environment", &sky], 1.0),
+    ] {
+        run(&[&["render", text(&scene), "-o", text(&picture)][..], &view, options].concat());
+        let (_, _, pixels) = formats::read_exr(&picture).unwrap();
+        let [left, middle, right] = [30 * 60 + 2, 30 * 60 + 30, 30 * 60 + 57].map(|i| pixels[i]);
+        for (seen, expected) in [(left, Vec3::X * scale), (middle, Vec3::ZERO), (right, Vec3::Y * scale)] {
+            assert!((seen - expected).abs().max_element() < 2e-3, "{options:?}: {seen}, expected {expected}");
+        }
+    }
+}
