@@ -166,11 +166,12 @@ fn by_paths<T>(scene: &Scene, view: &View, work: impl FnOnce(&Evaluator<'_>) -> 
     work(&|point| eye.diffuse(point, |seen| (light.irradiance(seen), samples)))
 }
 
-/// Direct light of surfaces is what a gather without reflectors says.
+/// Direct light of surfaces, and of nothing else, is what a gather without reflectors says.
 fn by_whitted<T>(scene: &Scene, view: &View, work: impl FnOnce(&Evaluator<'_>) -> T) -> T {
-    let (solution, _) = pipeline::solve(scene, &LightFlags { bounces: Some(0), ..LightFlags::default() }, None);
-    let gather = Gather::new(scene, &solution);
-    let points = PointGather::new(scene, &solution, &gather);
+    let surfaces = Scene { environment: None, ..scene.clone() };
+    let (solution, _) = pipeline::solve(&surfaces, &LightFlags { bounces: Some(0), ..LightFlags::default() }, None);
+    let gather = Gather::new(&surfaces, &solution);
+    let points = PointGather::new(&surfaces, &solution, &gather);
     let direct = |point: &SurfacePoint| points.irradiance(point);
     let bvh = Bvh::of_scene(scene);
     let whitted = Whitted::new(view.eye(scene, &bvh), &direct);

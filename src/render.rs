@@ -286,12 +286,12 @@ fn report(
     Ok(Outcome::Done)
 }
 
-/// The exposure of a picture: metered where something is seen that light reaches.
+/// The exposure of a picture: metered where a surface is seen that light reaches, as in `shot`.
 fn meter(evaluate: &Evaluator<'_>, (width, height): (u32, u32)) -> Exposure {
     let place = |i: u32, pixels: u32| (f64::from(i) + 0.5) * f64::from(pixels) / f64::from(METER_GRID);
     let point = |i: u32| DVec2::new(place(i % METER_GRID, width), place(i / METER_GRID, height));
     let seen: Vec<Evaluation> = (0..METER_GRID * METER_GRID).into_par_iter().map(|i| evaluate(point(i))).collect();
-    let luminances = seen.iter().map(|seen| luminance(seen.radiance.as_dvec3()));
+    let luminances = seen.iter().filter(|seen| seen.object != 0).map(|seen| luminance(seen.radiance.as_dvec3()));
     Exposure::metered(luminances.filter(|luminance| luminance.is_finite() && *luminance > 0.0))
 }
 
@@ -362,7 +362,7 @@ mod tests {
     #[test]
     fn background_and_what_is_no_number_do_not_meter() {
         let seen = |point: DVec2| match (point.x / 3.0) as u32 % 3 {
-            0 => Evaluation::default(),
+            0 => Evaluation { radiance: Vec3::ONE, object: 0, cost: 1 },
             1 => Evaluation { radiance: Vec3::NAN, object: 1, cost: 1 },
             _ => Evaluation { radiance: Vec3::splat(3.0), object: 1, cost: 1 },
         };

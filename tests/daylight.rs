@@ -23,6 +23,25 @@ fn floor_under(folder: &Path, environment: &str) -> PathBuf {
     path
 }
 
+/// A grey floor with a lamp over it, and an environment, before a camera that sees both and the sky.
+pub fn lit_floor_under(folder: &Path, environment: &str) -> PathBuf {
+    let square = |z: f64, half: f64| {
+        [(-1., -1.), (1., -1.), (1., 1.), (-1., 1.)].map(|(x, y)| DVec3::new(x * half, y * half, z))
+    };
+    let mut lamp = square(0.6, 0.2);
+    lamp.reverse();
+    write_scene(
+        folder,
+        "newmtl grey\nKd 0.5 0.5 0.5\nnewmtl lamp\nKd 0 0 0\nKe 9 9 9\n",
+        &[(square(0.0, 1.0), "grey"), (lamp, "lamp")],
+    );
+    let path = folder.join("floor.toml");
+    let model = "up = \"z\"\n[[model]]\nfile = \"scene.obj\"\n";
+    let camera = "[[camera]]\nname = \"aside\"\neye = [-3, -2, 1]\ntarget = [0, 0, 0.6]\n";
+    std::fs::write(&path, format!("{model}{camera}[environment]\n{environment}\n")).unwrap();
+    path
+}
+
 fn info(scene: &Path, options: &[&str]) -> Value {
     let printed = run(&[&["info", text(scene), "--json"], options].concat());
     serde_json::from_slice(&printed.stdout).unwrap()
@@ -130,5 +149,50 @@ fn paths_see_the_environment() {
             (found / expected - DVec3::ONE).abs().max_element() < 5e-3,
             "{options:?}: {found}, expected {expected}"
         );
+    }
+}
+
+/// Where a pixel sees no surface: by every sampler, by paths and by Whitted's rays, and by the lights of `render
+/// --environment`.
+#[test]
+fn pictures_show_the_environment_past_all_surfaces() {
+    let folder = folder();
+    let picture = folder.path().join("seen.exr");
+    formats::write_exr(&folder.path().join("sides.exr"), 2, 1, &[Vec3::X, Vec3::Y]).unwrap();
+    let scene = floor_under(folder.path(), "map = \"sides.exr\"\nscale = 2");
+    let sky = text(&folder.path().join("sides.exr")).to_owned();
+    // From above, north up: west is left.
+    let view = ["--eye", "0.5,0.5,1", "--target", "0.5,0.5,0", "--up", "0,1,0", "--fov", "100", "--size", "60x60"];
+    for (options, scale) in [
+        (&["--radiance", "path", "--sampler", "full", "--filter", "box"][..], 2.0),
+        (&["--radiance", "path", "--paths", "1", "--filter", "box"], 2.0),
+        (&["--radiance", "whitted", "--filter", "box"], 2.0),
+        (&["--radiance", "whitted", "--sampler", "coherence-map", "--budget", "100%", "--filter", "box"], 2.0),
+        (&["--environment", &sky], 1.0),
+    ] {
+        run(&[&["render", text(&scene), "-o", text(&picture)][..], &view, options].concat());
+        let (_, _, pixels) = formats::read_exr(&picture).unwrap();
+        let [left, middle, right] = [30 * 60 + 2, 30 * 60 + 30, 30 * 60 + 57].map(|i| pixels[i]);
+        for (seen, expected) in [(left, Vec3::X * scale), (middle, Vec3::ZERO), (right, Vec3::Y * scale)] {
+            assert!((seen - expected).abs().max_element() < 2e-3, "{options:?}: {seen}, expected {expected}");
+        }
+    }
+}
+
+/// `shot` shows it as `render` does, by whatever draws, and meters on surfaces alone.
+#[test]
+fn shots_show_the_environment_past_all_surfaces() {
+    let folder = folder();
+    let map = folder.path().join("even.exr");
+    formats::write_exr(&map, 2, 1, &[Vec3::new(0.5, 1.0, 0.25); 2]).unwrap();
+    let (bake, picture) = (folder.path().join("floor.hlf"), folder.path().join("shot.exr"));
+    let scene = lit_floor_under(folder.path(), "map = \"even.exr\"\nscale = 8");
+    run(&["bake", text(&scene), "-o", text(&bake)]);
+    for backend in ["cpu", "auto"] {
+        run(&["shot", text(&bake), "-o", text(&picture), "--size", "60x40", "--backend", backend]);
+        let (_, _, pixels) = formats::read_exr(&picture).unwrap();
+        assert!((pixels[0] - Vec3::new(4.0, 8.0, 2.0)).abs().max_element() < 0.02, "{backend}: {}", pixels[0]);
+        let shown = pixels.iter().filter(|pixel| (**pixel - pixels[0]).abs().max_element() < 0.02).count();
+        assert!((2000..2380).contains(&shown), "{backend}: {shown} of 2400 pixels see the sky");
     }
 }

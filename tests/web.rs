@@ -54,18 +54,23 @@ fn an_export_holds_what_it_says_and_replaces_the_one_before() {
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
 }
 
-/// The office in every mode, and a room with a texture and without cameras, which is baked by `export`.
+/// The office in every mode, a room with a texture and without cameras, which is baked by `export`, and a floor under a sky.
 #[test]
 fn a_browser_draws_what_the_cpu_draws_and_walks() {
     let (folder, scene) = (folder(), folder());
     let texels = [[255, 255, 255], [200, 30, 0], [0, 90, 10], [0, 0, 0], [9, 60, 250], [120, 120, 0]];
     formats::write_png(&scene.path().join("six.png"), 3, 2, &texels).unwrap();
     let textured = crate::textures::room(scene.path(), "Kd 0.8 0.8 0.8\nmap_Kd six.png");
-    for (input, name) in [(office(), "office"), (textured.as_path(), "textured")] {
+    let open = crate::daylight::lit_floor_under(scene.path(), "sky = 12\nscale = 0.1\nsun = [80, 20]");
+    for (input, name) in [(office(), "office"), (textured.as_path(), "textured"), (open.as_path(), "open")] {
         export(input, &folder.path().join(name));
     }
     let Some(browser) = Browser::open(folder.path(), include_str!("web/test.html")) else { return };
-    for (name, modes) in [("office", Mode::ALL.as_slice()), ("textured", &[Mode::Shaded])] {
+    for (name, modes) in [
+        ("office", Mode::ALL.as_slice()),
+        ("textured", &[Mode::Shaded]),
+        ("open", &[Mode::Shaded, Mode::Gouraud, Mode::Ids]),
+    ] {
         draws_what_the_cpu_draws(&browser, &folder.path().join(name), name, modes);
     }
     let report = browser.report();

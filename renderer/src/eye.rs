@@ -62,6 +62,11 @@ impl<'a> Eye<'a> {
         self.camera.ray(point, self.size[0], self.size[1])
     }
 
+    /// Radiance where a ray meets nothing, W·sr⁻¹·m⁻².
+    pub(crate) fn background(&self, direction: DVec3) -> Rgb {
+        self.scene().environment.as_ref().map_or(Rgb::ZERO, |environment| environment.seen(direction))
+    }
+
     /// The point of the image plane, pixels, where a position before the eye is seen.
     pub(crate) fn project(&self, position: DVec3) -> DVec2 {
         let (right, up, forward) = self.camera.basis();
@@ -121,11 +126,12 @@ impl<'a> Eye<'a> {
         }
     }
 
-    /// What is seen at a point of the image plane where surfaces reflect diffusely: L = ρE/π + Ke. The irradiance E, W·m⁻², of a
-    /// point of a surface comes with the number of rays that it took.
+    /// What is seen at a point of the image plane where surfaces reflect diffusely: L = ρE/π + Ke, and past them the scene's
+    /// environment. The irradiance E, W·m⁻², of a point of a surface comes with the number of rays that it took.
     pub fn diffuse(&self, point: DVec2, irradiance: impl FnOnce(&SurfacePoint) -> (Rgb, u32)) -> Evaluation {
-        match self.look(&self.ray(point)) {
-            Sight::Background => Evaluation { cost: 1, ..Evaluation::default() },
+        let ray = self.ray(point);
+        match self.look(&ray) {
+            Sight::Background => Evaluation { radiance: self.background(ray.direction).as_vec3(), object: 0, cost: 1 },
             Sight::Back(object) => Evaluation { object, cost: 1, ..Evaluation::default() },
             Sight::Front(SeenPoint { point, texture, object }) => {
                 let material = self.scene().material(point.polygon);
@@ -141,7 +147,7 @@ impl<'a> Eye<'a> {
 #[cfg(test)]
 mod tests {
     use glam::Vec3;
-    use scene::Texture;
+    use scene::{Environment, LatLongMap, Sky, Texture, UpAxis};
 
     use super::*;
     use crate::path_trace::test_scenes::{grey, scene_of};
@@ -169,6 +175,21 @@ mod tests {
         let back = seen(-1.0, 20.0);
         assert_eq!((back.radiance, back.object, back.cost), (Vec3::ZERO, BACK | 1, 1));
         assert_eq!(seen(1.0, 0.0), Evaluation { radiance: Vec3::ZERO, object: 0, cost: 1 });
+    }
+
+    #[test]
+    fn past_all_surfaces_the_environment_is_seen() {
+        let mut scene = scene_of(&[(square(0.0), grey(0.5, 0.0))]);
+        let map = LatLongMap { width: 2, height: 1, texels: vec![Vec3::X, Vec3::Y] };
+        scene.environment = Some(Environment { sky: Sky::Map(map), up: UpAxis::Z, rotation: 0.0, scale: 3.0 });
+        let bvh = Bvh::of_scene(&scene);
+        let eye = Eye::new(&scene, &bvh, from_above(1.0), 40, 20);
+        let seen = |x: f64| eye.diffuse(DVec2::new(x, 10.0), |_| (Rgb::ZERO, 0));
+        // West is left in the picture and in the map.
+        for (x, radiance) in [(0.5, Vec3::X * 3.0), (39.5, Vec3::Y * 3.0)] {
+            assert_eq!(seen(x), Evaluation { radiance, object: 0, cost: 1 });
+        }
+        assert_eq!(seen(20.0).radiance, Vec3::ZERO);
     }
 
     #[test]

@@ -138,7 +138,7 @@ fn block(
     for i in (0..size[1] as usize).flat_map(|row| row * columns..row * columns + size[0] as usize) {
         let seen = &seen[i * words..][..words];
         let radiance = match (&sights[i], places[i]) {
-            (Sight::Background, _) => environment.radiance(ray(i).direction),
+            (Sight::Background, _) => environment.seen(ray(i).direction),
             (Sight::Back(_), _) => Rgb::ZERO,
             (Sight::Front(front), None) => eye.scene().material(front.point.polygon).radiance,
             (Sight::Front(front), Some(place)) => {

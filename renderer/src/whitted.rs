@@ -1,6 +1,8 @@
 //! Rays as Whitted followed them ("An Improved Illumination Model for Shaded Display", CACM 1980): direct light, highlights and
 //! mirrors, and nothing that is left to chance.
 //!
+//! A ray that leaves the scene sees its environment, whose light on surfaces is none of theirs.
+//!
 //! Direct light of surfaces is handed in, as exact as its maker has it. Their highlights are the lobe of Phong's exponent about
 //! the mirrored ray over the whole lamp, in closed form ([`crate::lobe`]), less what of the lamps' light is hidden there in all.
 
@@ -53,7 +55,14 @@ impl<'a> Whitted<'a> {
                 Sight::Front(front) => front.object,
             };
             seen.object = if mirrors == 0 { object } else { scatter(seen.object.into(), object.into()) as u32 };
-            let Sight::Front(front) = sight else { break };
+            let front = match sight {
+                Sight::Front(front) => front,
+                Sight::Back(_) => break,
+                Sight::Background => {
+                    radiance += left * self.eye.background(direction);
+                    break;
+                }
+            };
             radiance += left * self.local(&front, direction, &mut seen.cost);
             let gloss = self.eye.scene().material(front.point.polygon).gloss;
             let Some(mirror) = gloss.filter(|gloss| gloss.is_mirror && mirrors < MOST_MIRRORS) else { break };
@@ -148,7 +157,7 @@ fn mirrored(direction: DVec3, receiver: &Receiver) -> DVec3 {
 #[cfg(test)]
 mod tests {
     use glam::Vec3;
-    use scene::{Bvh, Camera, Scene};
+    use scene::{Bvh, Camera, Environment, LatLongMap, Scene, Sky, UpAxis};
 
     use super::*;
     use crate::path_trace::test_scenes::{grey, scene_of};
@@ -219,6 +228,20 @@ mod tests {
         scene.materials[0].gloss = Some(mirror(1.0));
         let found = seen(&scene, DVec3::new(0.1, 0.0, 0.5), -DVec3::Z, &dark);
         assert!(is_near(found.radiance, 4.0 * 6.0 / PI) && found.cost == 1 + MOST_MIRRORS);
+    }
+
+    #[test]
+    fn a_mirror_shows_the_environment() {
+        let mut scene = scene_of(&[(square(0.0, 1.0), grey(0.5, 0.0))]);
+        let gloss = Gloss { diffuse: Rgb::ZERO, specular: Rgb::splat(0.25), exponent: 0.0, is_mirror: true };
+        scene.materials[0].gloss = Some(gloss);
+        let map = LatLongMap { width: 1, height: 2, texels: vec![Vec3::splat(8.0), Vec3::splat(5.0)] };
+        scene.environment = Some(Environment { sky: Sky::Map(map), up: UpAxis::Z, rotation: 0.0, scale: 1.0 });
+        let look = |z: f64, direction: DVec3| seen(&scene, DVec3::new(0.1, 0.0, z), direction, &dark);
+        assert!(is_near(look(0.5, -DVec3::Z).radiance, 0.25 * 8.0));
+        assert!(is_near(look(0.5, DVec3::Z).radiance, 8.0) && look(0.5, DVec3::Z).object == 0);
+        assert!(is_near(look(-0.5, -DVec3::Z).radiance, 5.0));
+        assert!(is_near(look(-0.5, DVec3::Z).radiance, 0.0), "a back is black");
     }
 
     /// The sharper the highlight, the more it is a mirror's picture of the lamp; at any exponent it is less than that.

@@ -142,6 +142,17 @@ impl Environment {
         self.radiance_at(u, v)
     }
 
+    /// Radiance that an eye sees in a direction of any length but 0, W·sr⁻¹·m⁻²: the sky, and before it the disc of the sun.
+    pub fn seen(&self, direction: DVec3) -> Rgb {
+        let sky = self.radiance(direction);
+        match self.sun() {
+            Some((to_sun, irradiance)) if to_sun.dot(direction.normalize_or_zero()) > SUN_RADIUS.cos() => {
+                sky + irradiance / (PI * SUN_RADIUS.sin().powi(2))
+            }
+            _ => sky,
+        }
+    }
+
     /// The sun itself: the unit direction to it, and what it sends to a surface that faces it, W·m⁻². None where there is no sun
     /// beside the sky.
     pub fn sun(&self) -> Option<(DVec3, Rgb)> {
@@ -261,6 +272,12 @@ mod tests {
                 assert!(environment.radiance(other).x <= brightest);
             }
         }
+        // Its disc is seen, and no more of it; on a surface that faces it L·π·sin² of its radius is the irradiance.
+        let across = direction.any_orthonormal_vector();
+        let seen = |angle: f64| environment.seen(3.0 * (direction * angle.cos() + across * angle.sin()));
+        let disc = seen(0.99 * SUN_RADIUS) - environment.radiance(direction);
+        assert!((disc.x * PI * SUN_RADIUS.sin().powi(2) / 400.0 - 1.0).abs() < 1e-4, "{disc}");
+        assert!(seen(1.01 * SUN_RADIUS).x < 1.01 * brightest);
         let dark = CieSky::new(13, [2.0, 0.5], 0.0).unwrap();
         assert_eq!(Environment { sky: Sky::Cie(dark), ..environment }.sun(), None);
         assert_eq!(map(2, 1).sun(), None);

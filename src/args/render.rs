@@ -167,7 +167,8 @@ pub enum RadianceChoice {
     /// The interpolants of the bake; a scene is baked first.
     #[default]
     Interpolant,
-    /// Direct light, mirrors and highlights, without noise: exact light of surfaces, and lights without one.
+    /// Direct light, mirrors and highlights, without noise: exact light of surfaces, and lights without one; of an environment
+    /// what is seen and mirrored, not its light on surfaces.
     Whitted,
 }
 

@@ -131,7 +131,7 @@ impl<'a> Capture<'a> {
         exposure: Exposure,
         take: impl FnOnce(Rows<'_>) -> T,
     ) -> Result<(T, FrameTimes), ViewerError> {
-        if frame.mode == Mode::Gouraud && self.baked.scene.textures.is_empty() {
+        if frame.mode == Mode::Gouraud && self.twin.records.textures.is_empty() {
             self.show_by_corners(frame, exposure, take)
         } else {
             self.show(frame, exposure, take)
@@ -172,7 +172,7 @@ impl<'a> Capture<'a> {
             (Mesh::upload(device, "gouraud", &vertices, &indices), bind_group(device, &pass.layout(), &[uniform]))
         });
         self.read_back(&["gouraud+tone_map"], take, |encoder, output| {
-            self.targets.write_uniform(self.gpu, frame, exposure);
+            self.targets.write_uniform(self.gpu, frame, exposure, self.bake.sky);
             let triangles = self.bake.chunks.in_view(&frame.camera, frame.width, frame.height);
             let times = self.timestamps.as_ref().map(|times| times.of_render(0));
             pass.encode(encoder, [output, &self.targets.depth], inputs, mesh, &triangles, times);
@@ -225,7 +225,7 @@ mod tests {
     use super::*;
     use crate::{
         Evaluator, draw_on_cpu,
-        test_room::{camera, room, textured_room},
+        test_room::{camera, room, room_under_sky, textured_room},
     };
 
     /// An adapter; none, loudly, where there is none and HALFLIGHT_REQUIRE_GPU does not ask for one.
@@ -265,6 +265,11 @@ mod tests {
         [Some(one.with_evaluator(Evaluator::Host)), other].into_iter().flatten().collect()
     }
 
+    /// All modes, and rooms for each.
+    fn in_every_mode() -> impl Iterator<Item = (Mode, Baked)> {
+        Mode::ALL.into_iter().flat_map(|mode| [room(), textured_room(), room_under_sky()].map(|room| (mode, room)))
+    }
+
     /// Pixels that are off by more than 1/255.
     fn differing(ours: &Picture, twin: &Picture) -> usize {
         let off = |(a, b): &(&[u8; 3], &[u8; 3])| a.iter().zip(*b).any(|(a, b)| a.abs_diff(*b) > 1);
@@ -288,7 +293,7 @@ mod tests {
         let outside = Camera { eye: DVec3::new(-1.5, -2.0, 5.0), ..camera() };
         let inside_a_wall = Camera { eye: DVec3::new(0.0, 1.0, 1.0), ..camera() };
         for gpu in gpus() {
-            for (mode, room) in Mode::ALL.into_iter().flat_map(|mode| [(mode, room()), (mode, textured_room())]) {
+            for (mode, room) in in_every_mode() {
                 for camera in [camera(), outside, inside_a_wall] {
                     let frame = Frame { camera, ..frame(mode) };
                     let ours = draw_on_gpu(&gpu, &room, &frame).unwrap();
@@ -311,7 +316,7 @@ mod tests {
     fn what_a_display_shows_is_the_same_without_radiance() {
         let outside = Camera { eye: DVec3::new(-1.5, -2.0, 5.0), ..camera() };
         for gpu in gpus() {
-            for (mode, room) in Mode::ALL.into_iter().flat_map(|mode| [(mode, room()), (mode, textured_room())]) {
+            for (mode, room) in in_every_mode() {
                 let twin = Twin::new(&room);
                 let capture = Capture::new(&gpu, &room, &twin, 321, 203).unwrap();
                 for camera in [camera(), outside] {

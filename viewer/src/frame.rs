@@ -33,11 +33,14 @@ pub(crate) struct FrameUniform {
     pub forward: [f32; 3],
     pub curve: u32,
     pub size: [f32; 2],
-    pub padding_size: [f32; 2],
+    /// Place of the environment's first word among the textures; 0 for none.
+    pub sky: u32,
+    /// Known to the browser's pass alone.
+    pub triangles: u32,
 }
 
 impl FrameUniform {
-    /// The numbers of a frame whose camera is valid.
+    /// The numbers of a frame whose camera is valid; whoever has the records adds where the environment is.
     pub fn of(frame: &Frame, exposure: Exposure) -> Self {
         let camera = frame.camera;
         let (right, up, forward) = camera.basis();
@@ -56,7 +59,8 @@ impl FrameUniform {
             forward: forward.as_vec3().to_array(),
             curve: frame.curve as u32,
             size: [frame.width as f32, frame.height as f32],
-            padding_size: [0.0; 2],
+            sky: 0,
+            triangles: 0,
         }
     }
 
@@ -154,9 +158,10 @@ impl Targets {
         })
     }
 
-    /// Tells the passes of a frame whose camera is valid.
-    pub fn write_uniform(&self, gpu: &Gpu, frame: &Frame, exposure: Exposure) {
-        gpu.queue.write_buffer(&self.uniform, 0, bytemuck::bytes_of(&FrameUniform::of(frame, exposure)));
+    /// Tells the passes of a frame whose camera is valid, and of the place of the environment.
+    pub fn write_uniform(&self, gpu: &Gpu, frame: &Frame, exposure: Exposure, sky: u32) {
+        let uniform = FrameUniform { sky, ..FrameUniform::of(frame, exposure) };
+        gpu.queue.write_buffer(&self.uniform, 0, bytemuck::bytes_of(&uniform));
     }
 }
 
@@ -247,7 +252,7 @@ pub(crate) fn encode_passes(drawing: &Drawing<'_>, encoder: &mut wgpu::CommandEn
 /// Passes (a) and (b), where somebody else does the rest.
 pub(crate) fn encode_visibility(drawing: &Drawing<'_>, encoder: &mut wgpu::CommandEncoder) {
     let &Drawing { gpu, bake, targets, frame, exposure, times } = drawing;
-    targets.write_uniform(gpu, frame, exposure);
+    targets.write_uniform(gpu, frame, exposure, bake.sky);
     gpu.passes.visibility().encode(
         encoder,
         [&targets.visibility_view, &targets.depth],

@@ -137,11 +137,13 @@ pub(crate) struct ResidentBake {
     pub mesh: Mesh,
     /// What pass (c) reads.
     pub light: ResidentLight,
+    /// [`Records::sky`].
+    pub sky: u32,
 }
 
 /// The light of a bake, where pass (c) finds it.
 pub(crate) enum ResidentLight {
-    /// For the adapter: triangles, elements, corners, textures, and whether there are any.
+    /// For the adapter: triangles, elements, corners, textures with the environment, and whether any triangle has one.
     Adapter { inputs: wgpu::BindGroup, is_textured: bool },
     /// For the host.
     Host(Arc<Records>),
@@ -162,7 +164,7 @@ impl ResidentBake {
         let unshared = (!gpu.passes.shares_vertices).then(|| records.mesh.unshared());
         let mesh = unshared.as_ref().unwrap_or(&records.mesh);
         let mesh = guarded(&gpu.device, || Mesh::upload(&gpu.device, "triangles", &mesh.vertices, &mesh.indices))?;
-        Ok(Self { chunks: Chunks::of(&records.corners), mesh, light })
+        Ok(Self { chunks: Chunks::of(&records.corners), mesh, light, sky: records.sky })
     }
 }
 
@@ -197,6 +199,6 @@ fn upload_light(gpu: &Gpu, records: &Records) -> Result<ResidentLight, ViewerErr
         let textures = storage("textures", bytemuck::cast_slice(&records.textures), size_of::<u32>());
         let buffers = [&triangles, &elements, &corners, &textures].map(wgpu::Buffer::as_entire_binding);
         let inputs = bind_group(&gpu.device, &gpu.passes.interpolant().bake_layout, &buffers);
-        ResidentLight::Adapter { inputs, is_textured: !records.textures.is_empty() }
+        ResidentLight::Adapter { inputs, is_textured: records.is_textured }
     })
 }

@@ -44,6 +44,7 @@ mod recording;
 mod records;
 mod refinement;
 mod screen;
+mod sky_records;
 mod spans;
 #[cfg(test)]
 mod test_room;

@@ -2,7 +2,8 @@
 
 use std::{fmt, str::FromStr};
 
-/// What a picture shows of a bake. Back sides are black in every mode, and so is the background.
+/// What a picture shows of a bake. Back sides are black in every mode. Past all surfaces pictures of light
+/// ([`Mode::is_light`]) show the scene's environment; without one, and in other modes, the background is black.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Mode {
     /// The light: quadratic interpolants, evaluated at every pixel.

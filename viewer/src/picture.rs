@@ -37,8 +37,8 @@ pub struct Picture {
     /// Height, pixels.
     pub height: u32,
     /// Linear radiance before exposure, W·sr⁻¹·m⁻², for the modes that show light alone ([`Mode::is_light`]). For the
-    /// others, whose colours are not radiance, the display-linear colour, 0..=1. Zero on back sides and background. Empty
-    /// where it was not asked for.
+    /// others, whose colours are not radiance, the display-linear colour, 0..=1. Zero on back sides; where nothing was hit that
+    /// of the scene's environment, in modes that show light alone, or zero. Empty where it was not asked for.
     pub radiance: Vec<Vec3>,
     /// What a display shows, sRGB: light after exposure and tone curve, other colours as they are.
     pub rgb: Vec<[u8; 3]>,

@@ -5,6 +5,7 @@ use scene::{Baked, EdgeKind, Interpolant, LineKind, Rgb};
 
 use crate::{
     id_mesh::IdMesh,
+    sky_records::sky_words,
     texture_records::{TexturePlace, texture_words},
 };
 
@@ -51,22 +52,28 @@ pub(crate) struct Records {
     pub mesh: IdMesh,
     /// Radiance of each leaf element by the solver's constant irradiance, W·sr⁻¹·m⁻²; the fourth number is padding.
     pub elements: Vec<[f32; 4]>,
-    /// Textures, as [`texture_words`] has them; empty where there are none.
+    /// Textures, as [`texture_words`] has them, and after them the environment, as [`sky_words`] has it; empty where there are
+    /// neither.
     pub textures: Vec<u32>,
+    /// Whether any triangle has a texture.
+    pub is_textured: bool,
+    /// The place of the environment's first word among the textures; 0 for none.
+    pub sky: u32,
 }
 
 impl Records {
     /// The arrays of a bake that validates.
     pub fn of(baked: &Baked) -> Self {
         let weights = WeightRange::of(baked);
-        let (textures, places) = texture_words(baked);
+        let (mut textures, places) = texture_words(baked);
+        let (is_textured, sky) = (!textures.is_empty(), append_sky(&mut textures, sky_words(baked)));
         let triangle = |id: u32| {
             let triangle = &baked.triangles[id as usize];
             let material = baked.scene.material(triangle.polygon);
             let place = places.get(id as usize).copied().unwrap_or_default();
-            let is_textured = place != TexturePlace::default();
+            let has_texture = place != TexturePlace::default();
             let reflectance =
-                if is_textured { material.reflectance } else { baked.scene.reflectance(triangle.polygon) };
+                if has_texture { material.reflectance } else { baked.scene.reflectance(triangle.polygon) };
             let Interpolant(coefficients) = baked.interpolant(id);
             let [a, b2, c2, d, e2, f] = coefficients.map(|c| (c / std::f64::consts::PI).as_vec3().to_array());
             let [e0, e1, e2_] = triangle.edges.map(|edge| edge_code(baked, edge, weights));
@@ -101,8 +108,22 @@ impl Records {
             mesh: IdMesh::of(baked),
             elements: baked.elements.iter().map(element).collect(),
             textures,
+            is_textured,
+            sky,
         }
     }
+}
+
+/// Puts the environment after the textures; its place, which is none where it is empty or beyond what u32 counts.
+fn append_sky(textures: &mut Vec<u32>, sky: Vec<u32>) -> u32 {
+    // A word that nobody reads, since no place is 0.
+    let unread = usize::from(textures.is_empty());
+    let place = u32::try_from(textures.len() + unread + sky.len()).map_or(0, |end| end - sky.len() as u32);
+    if sky.is_empty() || place == 0 {
+        return 0;
+    }
+    textures.extend(std::iter::repeat_n(0, unread).chain(sky));
+    place
 }
 
 impl TriangleRecord {

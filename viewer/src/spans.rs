@@ -54,12 +54,13 @@ impl<'a> Spans<'a> {
         Self { records, mode: frame.mode, uniform: FrameUniform::of(frame, exposure), eye: frame.camera.eye }
     }
 
-    /// What a display shows of a row.
+    /// What a display shows of a row; where nothing is seen, `background`, or the environment with its fourth number.
     pub fn show(&self, y: usize, ids: &[u32], table: &ToneTable, background: [u8; 4], shown: &mut [[u8; 4]]) {
         let mut x = 0;
         for ids in ids.chunk_by(|a, b| a == b) {
             let shown = &mut shown[x..x + ids.len()];
             match ids[0] {
+                0 if self.records.sky != 0 => self.show_sky([x, y], table, background[3], shown),
                 0 => shown.fill(background),
                 id if id & BACK != 0 => shown.fill([0, 0, 0, 255]),
                 id => self.show_span(id - 1, [x, y], table, shown),
@@ -72,11 +73,18 @@ impl<'a> Spans<'a> {
     pub fn colours(&self, y: usize, ids: &[u32]) -> impl Iterator<Item = Vec3> {
         ids.iter().enumerate().map(move |(x, &id)| {
             if id == 0 || id & BACK != 0 {
-                return Vec3::ZERO;
+                return self.colour(Seen { id, ..Seen::default() }, [x, y]);
             }
             let [s, t] = self.span(&self.records.corners[id as usize - 1], [x, y]).at(0.0);
             self.colour(Seen { id, s, t }, [x, y])
         })
+    }
+
+    fn show_sky(&self, [x, y]: [usize; 2], table: &ToneTable, alpha: u8, shown: &mut [[u8; 4]]) {
+        for (i, shown) in shown.iter_mut().enumerate() {
+            let colour = self.colour(Seen::default(), [x + i, y]) * self.uniform.exposure;
+            *shown = [table.shown(colour.x), table.shown(colour.y), table.shown(colour.z), alpha];
+        }
     }
 
     fn show_span(&self, triangle: u32, [x, y]: [usize; 2], table: &ToneTable, shown: &mut [[u8; 4]]) {
@@ -143,7 +151,7 @@ mod tests {
     use super::*;
     use crate::{
         Picture,
-        test_room::{camera, room, textured_room},
+        test_room::{camera, room, room_under_sky, textured_room},
         twin::Twin,
     };
 
@@ -200,6 +208,25 @@ mod tests {
                 let near = |(ours, theirs): (&[u8; 4], &[u8; 3])| (0..3).all(|i| ours[i].abs_diff(theirs[i]) <= 1);
                 let agree = shown.iter().zip(&rgb).filter(|&pair| near(pair)).count();
                 assert!(agree * 1000 >= rgb.len() * 999, "{mode}: {agree} of {} pixels", rgb.len());
+            }
+        }
+    }
+
+    /// By a row from outside, where nothing is seen.
+    #[test]
+    fn past_all_triangles_a_row_shows_the_environment() {
+        let twin = Twin::new(&room_under_sky());
+        for mode in [Mode::Shaded, Mode::Light, Mode::Ids] {
+            let frame = frame(mode);
+            let spans = Spans::new(&twin.records, &frame, Exposure { ev: -1.0 });
+            let uniform = FrameUniform::of(&frame, Exposure { ev: -1.0 });
+            let table = ToneTable::new(|light| light);
+            let mut row = [[9; 4]; 61];
+            spans.show(7, &[0; 61], &table, [1, 2, 3, 4], &mut row);
+            for (x, (shown, colour)) in row.iter().zip(spans.colours(7, &[0; 61])).enumerate() {
+                let sky = twin.records.background(&uniform, Vec2::new(x as f32 + 0.5, 7.5));
+                assert_eq!((colour, sky != Vec3::ZERO), (sky, mode.is_light()));
+                assert_eq!(*shown, [table.shown(sky.x / 2.0), table.shown(sky.y / 2.0), table.shown(sky.z / 2.0), 4]);
             }
         }
     }

@@ -3,8 +3,8 @@
 
 use glam::{DVec3, Vec2, Vec3};
 use scene::{
-    Baked, BakedElement, BakedTriangle, Camera, DiscontinuityLine, EdgeKind, LineKind, Material, Polygon,
-    SAMPLE_BARYCENTRICS, Scene, Texture,
+    Baked, BakedElement, BakedTriangle, Camera, DiscontinuityLine, EdgeKind, Environment, LatLongMap, LineKind,
+    Material, Polygon, SAMPLE_BARYCENTRICS, Scene, Sky, Texture, UpAxis,
 };
 
 /// Elements along each side of a wall.
@@ -48,6 +48,17 @@ pub(crate) fn textured_room() -> Baked {
     scene.texture_coordinates =
         corners.map(|p| Vec2::new(0.9 * p.x + 0.4 * p.y - 7.0, 0.3 * p.y - 0.7 * p.x)).collect();
     scene.tints = scene.mean_texture_colours();
+    baked.validate().expect("the room is a valid bake");
+    baked
+}
+
+/// The room under a sky of many colours, which is seen from outside alone.
+pub(crate) fn room_under_sky() -> Baked {
+    let mut baked = room();
+    let (width, height) = (16, 8);
+    let texel = |i: u32| Vec3::new((i % 5) as f32, (i % 7) as f32, (i % 3) as f32);
+    let sky = Sky::Map(LatLongMap { width, height, texels: (0..width * height).map(texel).collect() });
+    baked.scene.environment = Some(Environment { sky, up: UpAxis::Y, rotation: 0.5, scale: 2.0 });
     baked.validate().expect("the room is a valid bake");
     baked
 }

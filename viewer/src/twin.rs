@@ -14,6 +14,7 @@ use crate::{
     false_color::false_color,
     frame::{FrameUniform, NEAR},
     records::{Corners, Records, TriangleRecord},
+    sky_records::sky_along,
     texture_records::texture_colour,
     timing::{FrameTimes, Stopwatch},
     visibility_pass::BACK,
@@ -134,9 +135,20 @@ impl Records {
         texture_colour(&self.textures, record.texture(), s, t)
     }
 
+    /// What is seen past all triangles: the environment in pictures of light, and nothing in others.
+    pub fn background(&self, frame: &FrameUniform, place: Vec2) -> Vec3 {
+        if self.sky == 0 || frame.is_light == 0 {
+            return Vec3::ZERO;
+        }
+        sky_along(&self.textures[self.sky as usize..], ray_through(frame, place))
+    }
+
     /// Pass (c): the radiance or display-linear colour of a pixel.
     pub fn colour(&self, frame: &FrameUniform, mode: Mode, Seen { id, s, t }: Seen, place: Vec2) -> Vec3 {
-        if id == 0 || id & BACK != 0 {
+        if id == 0 {
+            return self.background(frame, place);
+        }
+        if id & BACK != 0 {
             return Vec3::ZERO;
         }
         let id = id - 1;
@@ -186,10 +198,15 @@ fn gouraud(record: &TriangleRecord, texture: Vec3, s: f32, t: f32) -> Vec3 {
 pub(crate) fn barycentrics(frame: &FrameUniform, corners: &Corners, place: Vec2) -> [f32; 2] {
     let [a, b, c] = corners.map(Vec3::from);
     let (ab, ac, eye) = (b - a, c - a, Vec3::from(frame.eye) - a);
+    let ray = ray_through(frame, place);
+    [ac.cross(eye), eye.cross(ab)].map(|normal| normal.dot(ray) / ac.cross(ab).dot(ray).max(1e-30))
+}
+
+/// The direction, of any length, from the eye through a place in the picture.
+fn ray_through(frame: &FrameUniform, place: Vec2) -> Vec3 {
     let [right, up, forward] = [frame.right, frame.up, frame.forward].map(Vec3::from);
     let [width, height] = frame.size;
-    let ray = right * (place.x - 0.5 * width) + up * (0.5 * height - place.y) + forward * frame.focal;
-    [ac.cross(eye), eye.cross(ab)].map(|normal| normal.dot(ray) / ac.cross(ab).dot(ray).max(1e-30))
+    right * (place.x - 0.5 * width) + up * (0.5 * height - place.y) + forward * frame.focal
 }
 
 /// A colour that neighbouring ids do not share: the id hashed (Jarzynski and Olano 2020, "pcg").
@@ -282,7 +299,7 @@ mod tests {
     use scene::ToneCurve;
 
     use super::*;
-    use crate::test_room::{camera, room};
+    use crate::test_room::{camera, room, room_under_sky};
 
     fn frame(mode: Mode) -> Frame {
         Frame { camera: camera(), width: 96, height: 64, mode, exposure: None, curve: ToneCurve::default() }
@@ -325,6 +342,31 @@ mod tests {
             assert!(picture.background > 0 && picture.background < 96 * 64);
             assert!(picture.rgb.iter().all(|&rgb| rgb == [0; 3]));
         }
+    }
+
+    /// In pictures of light, and at the exposure of the surfaces, or at none.
+    #[test]
+    fn past_all_triangles_the_environment_is_seen() {
+        let outside = Camera { eye: DVec3::new(-1.5, -2.0, 5.0), ..camera() };
+        let (room, dark) = (room_under_sky(), room());
+        for mode in Mode::ALL {
+            let frame = Frame { camera: outside, ..frame(mode) };
+            let (picture, without) = (draw_on_cpu(&room, &frame), draw_on_cpu(&dark, &frame));
+            assert_eq!((picture.background, picture.exposure), (without.background, without.exposure));
+            assert!(picture.background > 0);
+            let changed = picture.radiance.iter().zip(&without.radiance).filter(|(a, b)| a != b).count() as u64;
+            assert_eq!(changed, if mode.is_light() { picture.background } else { 0 }, "{mode}");
+        }
+        let alone = Baked {
+            scene: scene::Scene { environment: room.scene.environment, ..Default::default() },
+            ..Baked::default()
+        };
+        let picture = draw_on_cpu(&alone, &frame(Mode::Shaded));
+        let ray = camera().ray(DVec2::new(40.5, 20.5), 96, 64);
+        let exact = alone.scene.environment.unwrap().seen(ray.direction);
+        let ours = picture.radiance[20 * 96 + 40].as_dvec3();
+        assert!((ours - exact).length() < 5e-3 * exact.length(), "{ours} {exact}");
+        assert_eq!(picture.background, 96 * 64);
     }
 
     #[test]

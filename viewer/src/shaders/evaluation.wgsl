@@ -49,10 +49,46 @@ fn barycentrics(id: u32, pixel: vec2<f32>) -> vec2<f32> {
     let ab = position(3u * id + 1u) - a;
     let ac = position(3u * id + 2u) - a;
     let eye = frame.eye - a;
+    let ray = ray_through(pixel);
+    return vec2(dot(cross(ac, eye), ray), dot(cross(eye, ab), ray)) / max(dot(cross(ac, ab), ray), 1e-30);
+}
+
+// The direction, of any length, from the eye through a place in the picture.
+fn ray_through(pixel: vec2<f32>) -> vec3<f32> {
     let x = pixel.x - 0.5 * frame.size.x;
     let y = 0.5 * frame.size.y - pixel.y;
-    let ray = frame.right * x + frame.up * y + frame.forward * frame.focal;
-    return vec2(dot(cross(ac, eye), ray), dot(cross(eye, ab), ray)) / max(dot(cross(ac, ab), ray), 1e-30);
+    return frame.right * x + frame.up * y + frame.forward * frame.focal;
+}
+
+// What is seen past all triangles: the environment in pictures of light, and nothing in others.
+fn background(pixel: vec2<f32>) -> vec3<f32> {
+    if frame.sky == 0u || frame.is_light == 0u {
+        return vec3(0.0);
+    }
+    return sky_along(ray_through(pixel));
+}
+
+// The radiance of the environment in a direction, bilinear (`sky_records.rs`).
+fn sky_along(direction: vec3<f32>) -> vec3<f32> {
+    let sides = texture_word(frame.sky);
+    let size = vec2<i32>(i32(sides & 0xffffu), i32(sides >> 16u));
+    // At the very zenith any column will do.
+    let azimuth = atan2(direction.x, direction.y + 1e-30);
+    let polar = atan2(length(direction.xy), direction.z);
+    let place = vec2(azimuth / 6.2831853 + 0.5, polar / 3.14159265) * vec2<f32>(size) - 0.5;
+    let part = place - floor(place);
+    let first = vec2<i32>(floor(place));
+    let upper = sky_texel(size, first) * (1.0 - part.x) + sky_texel(size, first + vec2(1, 0)) * part.x;
+    let lower = sky_texel(size, first + vec2(0, 1)) * (1.0 - part.x) + sky_texel(size, first + vec2(1, 1)) * part.x;
+    return upper * (1.0 - part.y) + lower * part.y;
+}
+
+// A texel of the environment; columns from -1 to the width repeat.
+fn sky_texel(size: vec2<i32>, place: vec2<i32>) -> vec3<f32> {
+    let inside = clamp(place.y, 0, size.y - 1) * size.x + wrapped(place.x, size.x);
+    let texel = texture_word(frame.sky + 1u + u32(inside));
+    let mantissas = vec3(texel, texel >> 9u, texel >> 18u) & vec3(511u);
+    return vec3<f32>(mantissas) * exp2(f32(texel >> 27u) - 24.0);
 }
 
 fn colour_at(id: u32, pixel: vec2<f32>) -> vec3<f32> {

@@ -14,8 +14,18 @@ struct Corner {
 // WebGPU and WebGL2, and so all three say the same.
 @vertex
 fn corner(@builtin(vertex_index) index: u32) -> Corner {
+    if index / 3u == frame.triangles {
+        return Corner(sky_corner(index % 3u), frame.triangles);
+    }
     // Relative to the eye first, so that the rounding of a far origin does not reach the picture.
     return Corner(frame.clip_from_eye * vec4(position(index) - frame.eye, 1.0), index / 3u);
+}
+
+// One triangle that covers the picture behind all others: less far than what is cleared by the least that a depth buffer
+// tells apart, of reversed depth in WebGPU, and of 24 bits in WebGL2.
+fn sky_corner(index: u32) -> vec4<f32> {
+    let depth = select(1e-30, 0.9999999, ROWS_GO_UP);
+    return vec4(f32(index & 1u) * 4.0 - 1.0, f32(index >> 1u) * 4.0 - 1.0, depth, 1.0);
 }
 
 // Back sides are black.
@@ -25,11 +35,13 @@ fn pixel(
     @location(0) @interpolate(flat) triangle: u32,
     @builtin(front_facing) front: bool
 ) -> @location(0) vec4<f32> {
-    if !front {
-        return vec4(0.0, 0.0, 0.0, 1.0);
+    let at = vec2(place.x, select(place.y, frame.size.y - place.y, ROWS_GO_UP));
+    var colour = vec3(0.0);
+    if triangle == frame.triangles {
+        colour = background(at);
+    } else if front {
+        colour = colour_at(triangle, at);
     }
-    let row = select(place.y, frame.size.y - place.y, ROWS_GO_UP);
-    let colour = colour_at(triangle, vec2(place.x, row));
     if frame.is_light == 1u {
         return vec4(encode_srgb(tone_curve(colour * frame.exposure)), 1.0);
     }

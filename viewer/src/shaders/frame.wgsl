@@ -18,6 +18,10 @@ struct Frame {
     curve: u32,
     // Pixels.
     size: vec2<f32>,
+    // Place of the environment's first word among the textures; 0 for none.
+    sky: u32,
+    // Triangles of the bake, for the forward pass alone: the one after them is the sky.
+    triangles: u32,
 }
 
 // Where the tone curve leaves the straight line.

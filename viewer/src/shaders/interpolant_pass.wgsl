@@ -12,10 +12,12 @@ fn interpolate(@builtin(global_invocation_id) id: vec3<u32>) {
         return;
     }
     let seen = textureLoad(visibility, pixel, 0).x;
+    let place = vec2<f32>(pixel) + 0.5;
     var colour = vec3(0.0);
-    // Back sides are black.
-    if seen != 0u && seen < 0x80000000u {
-        let place = vec2<f32>(pixel) + 0.5;
+    if seen == 0u {
+        colour = background(place);
+    } else if seen < 0x80000000u {
+        // Back sides are black.
         colour = colour_at(seen - 1u, place);
     }
     textureStore(picture, pixel, vec4(colour, f32(seen != 0u)));

@@ -5,7 +5,7 @@
 @group(1) @binding(1) var<storage, read> elements: array<vec4<f32>>;
 // Three corners of three numbers a triangle.
 @group(1) @binding(2) var<storage, read> corners: array<f32>;
-// The table of sRGB, texels and texture coordinates, as `texture_records.rs` lays them out.
+// The table of sRGB, texels and texture coordinates, as `texture_records.rs` lays them out, then the environment.
 @group(1) @binding(3) var<storage, read> textures: array<u32>;
 
 // A row of a triangle's record.

@@ -28,6 +28,8 @@ pub(crate) struct Head {
     size: f64,
     /// Whether any triangle has a texture.
     pub textured: bool,
+    /// Place of the environment's first word among the textures; 0 for none.
+    sky: u32,
     /// Arrays of the records, by name: the first byte, and how many.
     pub arrays: Vec<Array>,
     /// All modes, by their numbers.
@@ -90,7 +92,8 @@ impl Head {
             triangles: baked.triangles.len(),
             error: [baked.error.rms, baked.error.p99],
             size: baked.scene.size(),
-            textured: !twin.records.textures.is_empty(),
+            textured: twin.records.is_textured,
+            sky: twin.records.sky,
             arrays: Vec::new(),
             modes: Mode::ALL.map(|mode| ModeHead { name: mode.name(), light: mode.is_light() }),
             curves: ToneCurve::ALL.map(ToneCurve::name),

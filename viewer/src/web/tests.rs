@@ -1,7 +1,7 @@
 use serde_json::Value;
 
 use super::*;
-use crate::test_room::{room, textured_room};
+use crate::test_room::{room, room_under_sky, textured_room};
 
 fn file<'a>(files: &'a [PageFile], name: &str) -> &'a [u8] {
     &files.iter().find(|file| file.name == name).expect(name).bytes
@@ -44,14 +44,15 @@ fn the_head_names_every_file_once() {
 
 #[test]
 fn the_arrays_are_the_records() {
-    for (baked, is_textured) in [(room(), false), (textured_room(), true)] {
+    for (baked, is_textured) in [(room(), false), (textured_room(), true), (room_under_sky(), false)] {
         let files = web_page(&baked, "room");
         let records = crate::records::Records::of(&baked);
         assert_eq!(array(&files, "triangles"), cast_slice::<_, u32>(&records.triangles));
         assert_eq!(array(&files, "elements"), cast_slice::<_, u32>(&records.elements));
         assert_eq!(array(&files, "corners"), cast_slice::<_, u32>(&records.corners));
         assert_eq!(array(&files, "textures"), records.textures);
-        assert_eq!(head(&files)["textured"], is_textured);
+        assert_eq!((&head(&files)["textured"], &head(&files)["sky"]), (&is_textured.into(), &records.sky.into()));
+        assert_eq!(records.sky != 0, baked.scene.environment.is_some());
         assert_eq!(files, web_page(&baked, "room"), "the same bake gives the same bytes");
     }
 }

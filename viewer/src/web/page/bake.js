@@ -27,6 +27,9 @@ export async function fetchBake(base, progress = () => {}) {
   return bake;
 }
 
+/** How many corners are drawn: three a triangle, and the sky's where there is an environment. */
+export const corners = ({ triangles, sky }) => 3 * (triangles + (sky ? 1 : 0));
+
 /** The response of a file that is there. */
 export async function fetched(address) {
   const response = await fetch(address);

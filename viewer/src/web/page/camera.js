@@ -28,11 +28,12 @@ export function isValid({ eye, target, up, fov }) {
  *
  * @param {object} frame camera, width and height in pixels, ev, curve (its number), and whether the tone map exposes it
  *   (light)
+ * @param {{sky: number, triangles: number}} head of the bake: where its environment lies, and how many triangles it has
  * @param {{near: number, reversed: boolean}} depth distance of the near plane, metres; whether depth is 1 there and 0
  *   far away, or goes from -1 to 1
  * @returns {ArrayBuffer}
  */
-export function uniform({ camera, width, height, ev, curve, light }, { near, reversed }) {
+export function uniform({ camera, width, height, ev, curve, light }, { sky, triangles }, { near, reversed }) {
   const [right, up, forward] = axes(camera);
   const half = Math.tan((camera.fov * Math.PI) / 360);
   const depths = reversed ? [0, 0, 0, near] : [...forward, -2 * near];
@@ -47,6 +48,7 @@ export function uniform({ camera, width, height, ev, curve, light }, { near, rev
   numbers.set(forward, 28);
   words[31] = curve;
   numbers.set([width, height], 32);
+  words.set([sky, triangles], 34);
   return buffer;
 }
 

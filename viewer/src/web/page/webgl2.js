@@ -1,7 +1,7 @@
 // The walk's pictures by WebGL2, where there is no WebGPU: the bake in pictures of numbers, and a program for every
 // mode.
 
-import { fetched } from "./bake.js";
+import { corners, fetched } from "./bake.js";
 import { uniform } from "./camera.js";
 
 /** Texels in a row of the pictures that hold the bake; `record_textures.wgsl` says the same. */
@@ -49,9 +49,9 @@ export async function openWebGl2(canvas, bake) {
     draw(frame) {
       gl.viewport(0, 0, frame.width, frame.height);
       gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
-      gl.bufferData(gl.UNIFORM_BUFFER, uniform(frame, depth), gl.DYNAMIC_DRAW);
+      gl.bufferData(gl.UNIFORM_BUFFER, uniform(frame, bake.head, depth), gl.DYNAMIC_DRAW);
       gl.useProgram(programs.get(frame.mode));
-      gl.drawArrays(gl.TRIANGLES, 0, 3 * bake.head.triangles);
+      gl.drawArrays(gl.TRIANGLES, 0, corners(bake.head));
     },
   };
 }

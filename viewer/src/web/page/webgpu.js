@@ -1,6 +1,6 @@
 // The walk's pictures by WebGPU: the bake in storage buffers, and one pass with a pipeline for every mode.
 
-import { fetched } from "./bake.js";
+import { corners, fetched } from "./bake.js";
 import { uniform } from "./camera.js";
 
 /**
@@ -73,7 +73,7 @@ export async function openWebGpu(canvas, bake) {
         depth?.destroy();
         depth = device.createTexture({ size, format: DEPTH_FORMAT, usage: GPUTextureUsage.RENDER_ATTACHMENT });
       }
-      device.queue.writeBuffer(frameBuffer, 0, uniform(frame, DEPTH));
+      device.queue.writeBuffer(frameBuffer, 0, uniform(frame, bake.head, DEPTH));
       const encoder = device.createCommandEncoder();
       const view = context.getCurrentTexture().createView();
       const pass = encoder.beginRenderPass({
@@ -87,7 +87,7 @@ export async function openWebGpu(canvas, bake) {
       });
       pass.setPipeline(pipelines.get(frame.mode));
       groups.forEach((group, index) => pass.setBindGroup(index, group));
-      pass.draw(3 * bake.head.triangles);
+      pass.draw(corners(bake.head));
       pass.end();
       device.queue.submit([encoder.finish()]);
     },
