@@ -16,7 +16,7 @@ use crate::failure::Usage;
 mod render;
 mod sky;
 
-pub use render::{Budget, Interpolation, RadianceChoice, RadianceFlags, RenderFlags, SamplerChoice};
+pub use render::{Budget, CoherenceFlags, Interpolation, RadianceChoice, RadianceFlags, RenderFlags, SamplerChoice};
 pub use sky::{SkyFlags, SkySource};
 
 /// Largest side of a picture, pixels: what every GPU of the last ten years takes as a texture.

@@ -77,6 +77,14 @@ pub struct CoherenceOptions {
     pub curve: Option<ToneCurve>,
 }
 
+impl CoherenceOptions {
+    /// Light as it is compared: exposed, and by the curve of a display.
+    pub(crate) fn compared(&self, radiance: Vec3) -> Vec3 {
+        let Self { exposure, curve, .. } = *self;
+        curve.map_or(radiance * exposure.factor(), |curve| Display::new(exposure, curve).light(radiance))
+    }
+}
+
 /// A coherence map in the making.
 ///
 /// Asked for a batch of points ([`CoherenceMap::next_batch`]) and told what is seen there ([`CoherenceMap::take`]), until there
@@ -229,13 +237,7 @@ impl CoherenceMap {
 
     /// The luminance that a display shows.
     fn shown(&self, radiance: Vec3) -> f32 {
-        luminance(self.compared(radiance).as_dvec3()) as f32
-    }
-
-    /// Light as it is compared: exposed, and by the curve of a display.
-    fn compared(&self, radiance: Vec3) -> Vec3 {
-        let CoherenceOptions { exposure, curve, .. } = self.options;
-        curve.map_or(radiance * exposure.factor(), |curve| Display::new(exposure, curve).light(radiance))
+        luminance(self.options.compared(radiance).as_dvec3()) as f32
     }
 
     fn look(&self, pixel: [u32; 2]) -> Option<(f32, u32)> {
@@ -407,7 +409,7 @@ impl CoherenceMap {
     }
 
     fn direction(&self, boundary: &Boundary) -> u8 {
-        boundary.least_discrepancy(|radiance| self.compared(radiance))
+        boundary.least_discrepancy(|radiance| self.options.compared(radiance))
     }
 
     /// Looks at a simple block on the next finer grid: it stays simple while its element says what is there.

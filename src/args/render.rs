@@ -115,9 +115,14 @@ pub struct CoherenceFlags {
     /// Where the map goes, with --sampler coherence-map: evaluated pixels white, blocks in the colour of their direction
     #[arg(long, value_name = "FILE.png", value_parser = png_path)]
     pub map: Option<PathBuf>,
+    /// Evaluate pixels of the work image over their area, by as many samples as it takes until they are known (--level,
+    /// --interval), with --sampler coherence-map: for light with noise, that of a full picture goes to the few pixels
+    #[arg(long)]
+    pub relocate: bool,
 }
 
-/// When the adaptive sampler takes a pixel for known: when its mean is within an interval with a probability.
+/// When the adaptive sampler, or a coherence map with --relocate, takes a pixel for known: when its mean is within an interval
+/// with a probability.
 #[derive(Clone, Copy, Debug, Args)]
 pub struct ConfidenceFlags {
     /// That probability, between 0 and 1
