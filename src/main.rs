@@ -6,6 +6,7 @@ mod args;
 mod artist;
 mod bake;
 mod compare;
+mod error_map;
 mod error_picture;
 mod export;
 mod failure;

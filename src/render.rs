@@ -16,6 +16,7 @@ use serde::Serialize;
 
 use crate::args::{Budget, CoherenceFlags, ExposureChoice, ImageKind, Interpolation, RenderFlags, SamplerChoice};
 use crate::compare::relative_norms;
+use crate::error_map::error_map;
 use crate::failure::{Outcome, Usage};
 use crate::input::Input;
 use crate::interrupt::Interrupt;
@@ -51,6 +52,7 @@ pub fn run(flags: &RenderFlags, outputs: &Outputs, interrupt: &Interrupt) -> Res
     let output = outputs.claim(&flags.output)?;
     let coherence = flags.coherence.map.as_deref().map(|path| outputs.claim(path)).transpose()?;
     let map = flags.sample_map.as_deref().map(|path| outputs.claim(path)).transpose()?;
+    let errors = flags.error_map.as_deref().map(|path| outputs.claim(path)).transpose()?;
     if let Some(folder) = &flags.snapshots {
         std::fs::create_dir_all(folder).with_context(|| format!("cannot make the folder {}", folder.display()))?;
     }
@@ -81,7 +83,12 @@ pub fn run(flags: &RenderFlags, outputs: &Outputs, interrupt: &Interrupt) -> Res
             let [width, height] = map.work_size();
             output.write(|path| formats::write_png(path, width, height, &map.map()))?;
         }
-        let norms = full.map(|full| relative_norms(&picture.light(), &full));
+        let compared = full.map(|full| (picture.light(), full));
+        if let (Some(output), Some((light, full))) = (&errors, &compared) {
+            let (width, height) = flags.size;
+            output.write(|path| formats::write_png(path, width, height, &error_map(light, full)))?;
+        }
+        let norms = compared.map(|(light, full)| relative_norms(&light, &full));
         report(&picture, flags, exposure, map.as_ref(), norms, interrupt.pressed())
     })
 }
@@ -96,6 +103,9 @@ fn check(flags: &RenderFlags) -> Result<()> {
     }
     if is_coherent && flags.interpolation != Interpolation::Constant {
         bail!(Usage("--interpolation: a coherence map has its own; leave it out".into()));
+    }
+    if flags.error_map.is_some() && flags.compare.is_none() {
+        bail!(Usage("--error-map is of the difference from a full picture; give one with --compare FULL.exr".into()));
     }
     if flags.compare.is_some() && !flags.is_exr() {
         bail!(Usage("--compare is of radiance; let the name of --output end in .exr".into()));

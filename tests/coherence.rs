@@ -35,6 +35,7 @@ fn what_cannot_be_is_refused_by_the_name_of_its_flag() {
     assert!(said(&[&MAP[..], &["--interpolation", "smooth"]].concat()).contains("--interpolation"));
     let png = folder.path().join("out.png");
     assert!(fails(2, &["render", text(&scene), "-o", text(&png), "--compare", "full.exr"]).contains(".exr"));
+    assert!(said(&["--error-map", "errors.png"]).contains("--compare FULL.exr"));
     let missing = folder.path().join("missing.exr");
     assert!(fails(1, &["render", text(&scene), "-o", text(&picture), "--compare", text(&missing)]).contains("missing"));
     assert!(!picture.exists());
@@ -50,7 +51,12 @@ fn few_pixels_are_near_and_all_are_equal() {
     let all = render(&scene, &full, &options);
     assert_eq!(all["evaluated_share"].as_f64(), Some(1.0));
     let again = [&options[..], &["--compare", text(&full)]].concat();
-    let few = render(&scene, &picture, &[&again[..], &["--budget", "6%"]].concat());
+    let errors = folder.path().join("errors.png");
+    let few = render(&scene, &picture, &[&again[..], &["--budget", "6%", "--error-map", text(&errors)]].concat());
+    let (width, height, off) = formats::read_png(&errors).unwrap();
+    assert_eq!((width, height), (250, 187));
+    let equal = off.iter().filter(|pixel| **pixel == [200; 3]).count();
+    assert!((off.len() / 10..off.len()).contains(&equal), "{equal} pixels are right");
     assert!((few["evaluated_share"].as_f64().unwrap() - 0.06).abs() < 1e-4);
     let [l1, l2] = ["l1", "l2"].map(|norm| few[norm].as_f64().unwrap());
     assert!(l1 < 0.03 && l2 < 0.08, "{l1} {l2}");

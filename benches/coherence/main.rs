@@ -1,12 +1,17 @@
 //! Directional coherence maps: the table of Guo 1998 again, beside adaptive sampling with as many samples.
 //!
 //! `cargo bench --workspace --bench coherence` prints a page for data/record/: direct light, exact at every pixel. `-- bounces`
-//! gathers all light, in pictures of half the side, for half an hour of processor time; `-- relocation` compares pictures with noise.
+//! gathers all light, in pictures of half the side, for half an hour of processor time; `-- relocation` compares pictures with
+//! noise, `-- mirrors` those of flat and curved mirrors.
 
 #![allow(clippy::print_stdout, clippy::unwrap_used)]
 
 #[path = "../common/mod.rs"]
 mod common;
+#[allow(unused_imports, reason = "of the scenes two are looked at")]
+#[path = "../common/generated/mod.rs"]
+mod generated;
+mod mirrors;
 mod pictures;
 #[path = "../../src/point_gather.rs"]
 mod point_gather;
@@ -34,7 +39,8 @@ fn main() {
         None => tables(Some(0), SIDE),
         Some("bounces") => tables(None, SIDE / 2),
         Some("relocation") => relocation::run(),
-        Some(other) => panic!("{other} is no part; give bounces or relocation, or nothing"),
+        Some("mirrors") => mirrors::run(),
+        Some(other) => panic!("{other} is no part; give bounces, relocation or mirrors, or nothing"),
     }
 }
 

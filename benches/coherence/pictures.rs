@@ -2,7 +2,7 @@
 
 use glam::{DVec2, Vec3};
 use rayon::prelude::*;
-use renderer::{CoherenceMap, CoherenceOptions, Evaluation, Evaluator, Eye, object_edges, visible_lines};
+use renderer::{CoherenceMap, CoherenceOptions, Evaluation, Evaluator, Eye, VisibleLine, object_edges, visible_lines};
 use scene::{Exposure, ToneCurve};
 
 /// Pixels of the work image along a side of the picture's.
@@ -21,10 +21,17 @@ pub struct Made {
 }
 
 pub fn picture(eye: &Eye<'_>, side: u32, most: usize, compared: Compared, evaluate: &Evaluator<'_>) -> Made {
+    let (lines, looking) = timed(|| visible_lines(eye, &object_edges(eye)));
+    let mut made = refined(&lines, side, most, compared, evaluate);
+    made.of_map += looking;
+    made
+}
+
+/// A map of so many pixels at most, by lines that are visible.
+pub fn refined(lines: &[VisibleLine], side: u32, most: usize, compared: Compared, evaluate: &Evaluator<'_>) -> Made {
     let Compared { exposure, curve } = compared;
     let options = CoherenceOptions { supersample: SUPERSAMPLE, exposure, curve };
-    let (lines, mut of_map) = timed(|| visible_lines(eye, &object_edges(eye)));
-    let mut map = CoherenceMap::new(side, side, &options, &lines).unwrap();
+    let (mut map, mut of_map) = timed(|| CoherenceMap::new(side, side, &options, lines).unwrap());
     loop {
         let (batch, placing) = timed(|| map.next_batch(most - map.evaluated()));
         if batch.is_empty() {

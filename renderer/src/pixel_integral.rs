@@ -1,9 +1,9 @@
-//! The light of a pixel of the work image by hierarchical integration (Kajiya, "The Rendering Equation", SIGGRAPH 1986), until an
-//! interval of confidence says that it is known (Painter & Sloan 1989): the confidence relocation of Guo 1998, sections 5 and 6.2.
-//! A coherence map that is handed such pixels spends on few what a full picture spends on all.
+//! The light of a pixel of the work image by hierarchical integration (Kajiya, "The Rendering Equation", SIGGRAPH 1986),
+//! until an interval of confidence says that it is known (Painter & Sloan 1989): the confidence relocation of Guo 1998,
+//! sections 5 and 6.2. A coherence map that is handed such pixels spends on few what a full picture spends on all.
 //!
-//! What we do differently: all cells of a pixel are halved at once, so its samples are a power of two. Halving the worst cell first,
-//! as Kajiya has it, gains where a pixel is half noise; the pixels of a work image are too small for that.
+//! What we do differently: all cells of a pixel are halved at once, so its samples are a power of two. Halving the worst cell
+//! first, as Kajiya has it, gains where a pixel is half noise; the pixels of a work image are too small for that.
 
 use glam::{DVec2, Vec3, Vec3A};
 
@@ -13,12 +13,12 @@ use crate::confidence::{Confidence, Interval};
 use crate::evaluation::{Evaluation, Evaluator};
 use crate::sequence::scatter;
 
-/// Samples before the interval is asked: one in each quarter. With two, a pixel in four that a border parts in halves is taken for
-/// known by two samples on one side of it.
+/// Samples before the interval is asked: one in each quarter. With two, a pixel in four that a border parts in halves is
+/// taken for known by two samples on one side of it.
 const FEWEST: usize = 4;
 
-/// Samples from which on a pixel is left as it is, so that light which scatters without end does not take all the time. More make
-/// dark corners that paths hardly reach finer, where nobody looks.
+/// Samples from which on a pixel is left as it is, so that light which scatters without end does not take all the time. More
+/// make dark corners that paths hardly reach finer, where nobody looks.
 const MOST: usize = 1024;
 
 /// How many pixels a pixel's cells are the cells of.
@@ -39,17 +39,17 @@ struct Sample {
 }
 
 impl PixelIntegral {
-    /// Of the pixels of a coherence map, until with a probability `level`, between 0 and 1, each is within an interval, of the light
-    /// that is compared there.
+    /// Of the pixels of a coherence map, until with a probability `level`, between 0 and 1, each is within an interval, of
+    /// the light that is compared there.
     pub fn new(options: &CoherenceOptions, level: f64, interval: Interval, seed: u64) -> Self {
         Self { options: *options, confidence: Confidence::new(level, interval), seed }
     }
 
-    /// The mean of what is seen in the pixel about a point of the picture, and the object that most of it shows. The cost is that
-    /// of all samples, of which there are 4 to 1024.
+    /// The mean of what is seen in the pixel about a point of the picture, and the object that most of it shows. The cost is
+    /// that of all samples, of which there are 4 to 1024.
     ///
-    /// A sample whose radiance is no finite number ends the pixel, and makes its radiance none. The same point always has the same
-    /// samples.
+    /// A sample whose radiance is no finite number ends the pixel, and makes its radiance none. The same point always has the
+    /// same samples.
     pub fn mean(&self, centre: DVec2, evaluate: &Evaluator<'_>) -> Evaluation {
         let seed = scatter(scatter(self.seed, centre.x.to_bits()), centre.y.to_bits());
         let look = |cell: Cell| {
@@ -64,8 +64,8 @@ impl PixelIntegral {
         mean(&samples)
     }
 
-    /// Whether the samples of equal cells tell enough of their mean. Both halves of a cell stand side by side: the difference of
-    /// each two is one degree of freedom of its variance.
+    /// Whether the samples of equal cells tell enough of their mean. Both halves of a cell stand side by side: the difference
+    /// of each two is one degree of freedom of its variance.
     fn is_known(&self, samples: &[Sample]) -> bool {
         if samples.iter().any(|sample| !sample.seen.radiance.is_finite()) {
             return true;

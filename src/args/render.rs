@@ -71,6 +71,9 @@ pub struct RenderFlags {
     /// Full picture (.exr) that this one is compared with: the L1 and L2 norms of the difference, relative to its own
     #[arg(long, value_name = "FULL.exr")]
     pub compare: Option<PathBuf>,
+    /// Where a map of the difference goes, with --compare: blue where this picture is too dark, red where it is too bright
+    #[arg(long, value_name = "FILE.png", value_parser = png_path)]
+    pub error_map: Option<PathBuf>,
     /// Seed of all that is left to chance; the same seed gives the same picture
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub seed: u64,
