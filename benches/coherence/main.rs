@@ -8,6 +8,7 @@
 
 #[path = "../common/mod.rs"]
 mod common;
+mod discontinuities;
 #[allow(unused_imports, reason = "of the scenes two are looked at")]
 #[path = "../common/generated/mod.rs"]
 mod generated;
@@ -40,7 +41,8 @@ fn main() {
         Some("bounces") => tables(None, SIDE / 2),
         Some("relocation") => relocation::run(),
         Some("mirrors") => mirrors::run(),
-        Some(other) => panic!("{other} is no part; give bounces, relocation or mirrors, or nothing"),
+        Some("discontinuities") => discontinuities::run(),
+        Some(other) => panic!("{other} is no part; give bounces, relocation, mirrors or discontinuities, or nothing"),
     }
 }
 

@@ -9,6 +9,7 @@ mod block;
 mod cell;
 mod coherence_map;
 mod coherence_picture;
+mod coherence_step;
 mod coherent_visibility;
 mod confidence;
 mod delaunay;
