@@ -1,6 +1,6 @@
 //! Writes a generated scene: `cargo run --release --example generate -- hall 24000 OUT.obj`, or `-- rooms 8 OUT.obj`.
 //!
-//! The number is that of polygons of the hall, of rooms, of faces around a round shape, of dominoes or of leaves. An MTL file
+//! The number is that of polygons of the hall, of rooms, of faces around a round shape, of dominoes, of leaves or of bars. An MTL file
 //! of the same name is written beside it.
 
 #[path = "../benches/common/generated/mod.rs"]
@@ -16,7 +16,9 @@ const LARGEST: u32 = 20_000_000;
 fn main() -> Result<()> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let [family, size, output] = arguments.as_slice() else {
-        bail!("give a family (hall, rooms, shapes, dominoes or plant), a size and an .obj file to write");
+        bail!(
+            "give a family (hall, rooms, shapes, dominoes, plant, looking-glass or tori), a size and an .obj file to write"
+        );
     };
     let size: u32 = size.parse().with_context(|| format!("{size:?} is not a size; write a whole number"))?;
     if size > LARGEST {
@@ -28,7 +30,11 @@ fn main() -> Result<()> {
         "shapes" => generated::shapes(size),
         "dominoes" => generated::dominoes(size),
         "plant" => generated::plant(size),
-        _ => bail!("{family:?} is no family of scenes; give hall, rooms, shapes, dominoes or plant"),
+        "looking-glass" => generated::looking_glass(size),
+        "tori" => generated::tori(size),
+        _ => {
+            bail!("{family:?} is no family of scenes; give hall, rooms, shapes, dominoes, plant, looking-glass or tori")
+        }
     };
     scene.validate().with_context(|| format!("a scene of that size is none; give less than {size}"))?;
     let obj = Path::new(output);

@@ -18,7 +18,7 @@ mod render;
 mod sky;
 
 pub use environment::{EnvironmentFlags, SkySource};
-pub use render::{Budget, Interpolation, RadianceChoice, RadianceFlags, RenderFlags, SamplerChoice};
+pub use render::{Budget, CoherenceFlags, Interpolation, RadianceChoice, RadianceFlags, RenderFlags, SamplerChoice};
 pub use sky::SkyFlags;
 
 /// Largest side of a picture, pixels: what every GPU of the last ten years takes as a texture.

@@ -58,8 +58,13 @@ pub fn error_picture(
 /// The colour of one comparison.
 fn colour(comparison: &Comparison, tolerance: f64) -> [f64; 3] {
     let size = if comparison.is_noise() { 0.0 } else { comparison.error() / tolerance };
-    let part = ((size - GREY) / (SATURATED - GREY)).clamp(0.0, 1.0);
-    let full = if comparison.signed() < 0.0 { TOO_DARK } else { TOO_BRIGHT };
+    let part = ((size - GREY) / (SATURATED - GREY)).max(0.0);
+    signed_colour(part.copysign(comparison.signed()))
+}
+
+/// The colour of an error, as a display shows it: grey for none, blue for −1 and less, too dark, red for 1 and more, too bright.
+pub fn signed_colour(error: f64) -> [f64; 3] {
+    let (part, full) = (error.abs().min(1.0), if error < 0.0 { TOO_DARK } else { TOO_BRIGHT });
     std::array::from_fn(|channel| NEUTRAL[channel] + (full[channel] - NEUTRAL[channel]) * part)
 }
 

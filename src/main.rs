@@ -7,6 +7,7 @@ mod artist;
 mod bake;
 mod compare;
 mod environment;
+mod error_map;
 mod error_picture;
 mod export;
 mod failure;

@@ -3,8 +3,10 @@
 use std::sync::Arc;
 
 use anyhow::{Result, bail, ensure};
+use glam::DVec3;
 use renderer::{
-    Evaluator, Eye, PathLight, PathOptions, SurfacePoint, VisibleLine, Whitted, object_edges, visible_lines,
+    Evaluator, Eye, PathLight, PathOptions, SurfacePoint, VisibleLine, Whitted, object_edges, reflected_lines,
+    visible_lines,
 };
 use scene::{Baked, Bvh, Camera, DiscontinuityLine, Provenance, Rgb, Scene};
 use solver::{Gather, Solution};
@@ -71,13 +73,17 @@ pub struct Lines<'a> {
 }
 
 impl Lines<'_> {
-    /// Those that are visible.
+    /// Those that are visible; also in planar mirrors, where samples see what these show.
     pub fn visible(&self) -> Vec<VisibleLine> {
         let bvh = Bvh::of_scene(self.scene);
         let eye = self.view.eye(self.scene, &bvh);
-        let mut segments = object_edges(&eye);
-        segments.extend(self.discontinuities.iter().map(|line| line.ends.map(|end| end.as_dvec3())));
-        visible_lines(&eye, &segments)
+        let discontinuities: Vec<[DVec3; 2]> =
+            self.discontinuities.iter().map(|line| line.ends.map(|end| end.as_dvec3())).collect();
+        let mut lines = visible_lines(&eye, &[&object_edges(&eye)[..], &discontinuities].concat());
+        if self.view.radiance.radiance == RadianceChoice::Whitted {
+            lines.extend(reflected_lines(&eye, &discontinuities));
+        }
+        lines
     }
 }
 

@@ -8,13 +8,15 @@ use formats::FormatError;
 use glam::{DVec2, Vec3};
 use rayon::prelude::*;
 use renderer::{
-    AdaptiveOptions, CoherenceMap, CoherenceOptions, Evaluation, Evaluator, Filter, sample_histogram, sample_map,
+    AdaptiveOptions, CoherenceMap, CoherenceOptions, Evaluation, Evaluator, Filter, PixelIntegral, sample_histogram,
+    sample_map,
 };
 use scene::{Display, Exposure, luminance};
 use serde::Serialize;
 
-use crate::args::{Budget, ExposureChoice, ImageKind, Interpolation, RenderFlags, SamplerChoice};
+use crate::args::{Budget, CoherenceFlags, ExposureChoice, ImageKind, Interpolation, RenderFlags, SamplerChoice};
 use crate::compare::relative_norms;
+use crate::error_map::error_map;
 use crate::failure::{Outcome, Usage};
 use crate::input::Input;
 use crate::interrupt::Interrupt;
@@ -50,6 +52,7 @@ pub fn run(flags: &RenderFlags, outputs: &Outputs, interrupt: &Interrupt) -> Res
     let output = outputs.claim(&flags.output)?;
     let coherence = flags.coherence.map.as_deref().map(|path| outputs.claim(path)).transpose()?;
     let map = flags.sample_map.as_deref().map(|path| outputs.claim(path)).transpose()?;
+    let errors = flags.error_map.as_deref().map(|path| outputs.claim(path)).transpose()?;
     if let Some(folder) = &flags.snapshots {
         std::fs::create_dir_all(folder).with_context(|| format!("cannot make the folder {}", folder.display()))?;
     }
@@ -58,6 +61,14 @@ pub fn run(flags: &RenderFlags, outputs: &Outputs, interrupt: &Interrupt) -> Res
         let exposure = match flags.exposure {
             ExposureChoice::Fixed(exposure) => exposure,
             ExposureChoice::Auto => meter(evaluate, flags.size),
+        };
+        let integral = flags.coherence.relocate.then(|| {
+            let confidence = &flags.confidence;
+            PixelIntegral::new(&coherence_options(flags, exposure), confidence.level, confidence.interval(), flags.seed)
+        });
+        let evaluate: &Evaluator<'_> = &|point| match &integral {
+            Some(integral) => integral.mean(point, evaluate),
+            None => evaluate(point),
         };
         let mut picture = begin(flags, exposure, &limit, evaluate, lines)?;
         let snapshot = |picture: &mut Picture| -> Result<()> {
@@ -72,7 +83,12 @@ pub fn run(flags: &RenderFlags, outputs: &Outputs, interrupt: &Interrupt) -> Res
             let [width, height] = map.work_size();
             output.write(|path| formats::write_png(path, width, height, &map.map()))?;
         }
-        let norms = full.map(|full| relative_norms(&picture.light(), &full));
+        let compared = full.map(|full| (picture.light(), full));
+        if let (Some(output), Some((light, full))) = (&errors, &compared) {
+            let (width, height) = flags.size;
+            output.write(|path| formats::write_png(path, width, height, &error_map(light, full)))?;
+        }
+        let norms = compared.map(|(light, full)| relative_norms(&light, &full));
         report(&picture, flags, exposure, map.as_ref(), norms, interrupt.pressed())
     })
 }
@@ -80,11 +96,16 @@ pub fn run(flags: &RenderFlags, outputs: &Outputs, interrupt: &Interrupt) -> Res
 /// Refuses flags that say nothing of the picture that is asked for.
 fn check(flags: &RenderFlags) -> Result<()> {
     let is_coherent = flags.sampler == SamplerChoice::CoherenceMap;
-    if !is_coherent && (flags.coherence.supersample.is_some() || flags.coherence.map.is_some()) {
-        bail!(Usage("--supersample and --map are of a coherence map; give --sampler coherence-map".into()));
+    let CoherenceFlags { supersample, map, relocate } = &flags.coherence;
+    if !is_coherent && (supersample.is_some() || map.is_some() || *relocate) {
+        let why = "--supersample, --map and --relocate are of a coherence map; give --sampler coherence-map";
+        bail!(Usage(why.into()));
     }
     if is_coherent && flags.interpolation != Interpolation::Constant {
         bail!(Usage("--interpolation: a coherence map has its own; leave it out".into()));
+    }
+    if flags.error_map.is_some() && flags.compare.is_none() {
+        bail!(Usage("--error-map is of the difference from a full picture; give one with --compare FULL.exr".into()));
     }
     if flags.compare.is_some() && !flags.is_exr() {
         bail!(Usage("--compare is of radiance; let the name of --output end in .exr".into()));
@@ -188,11 +209,16 @@ fn begin(
     })
 }
 
+fn coherence_options(flags: &RenderFlags, exposure: Exposure) -> CoherenceOptions {
+    let curve = (!flags.is_exr()).then_some(flags.tone_curve);
+    CoherenceOptions { supersample: flags.supersample(), exposure, curve }
+}
+
 /// Begins the picture of a coherence map.
 fn begin_coherent(flags: &RenderFlags, exposure: Exposure, lines: &Lines<'_>) -> Result<Picture> {
     let (width, height) = flags.size;
     let supersample = flags.supersample();
-    let options = CoherenceOptions { supersample, exposure, curve: (!flags.is_exr()).then_some(flags.tone_curve) };
+    let options = coherence_options(flags, exposure);
     let map = CoherenceMap::new(width, height, &options, &lines.visible()).ok_or_else(|| {
         let why = "the work image cannot be that large; ask for fewer pixels";
         Usage(format!("--size {width}x{height} with --supersample {supersample}: {why}"))

@@ -4,7 +4,7 @@ use glam::DVec3;
 use scene::{Bvh, HalfEdges, NO_TWIN, Ray, Scene};
 
 use crate::fixture::folder;
-use crate::generated::{dominoes, hall, mtl, obj, plant, rooms, shapes};
+use crate::generated::{dominoes, hall, looking_glass, mtl, obj, plant, rooms, shapes, tori};
 
 /// The scene as the importer reads it from its text.
 fn read_back(scene: &Scene) -> formats::Imported {
@@ -63,6 +63,18 @@ fn what_stands_under_the_sky_reads_back() {
         };
         assert!(smooth(&imported.scene) >= 0.8 * smooth(&scene), "{} of {}", smooth(&imported.scene), smooth(&scene));
         assert_eq!(scene.bounds().0.z, 0.0);
+    }
+}
+
+/// Mirrors are still mirrors, and a warning says that no bake knows them.
+#[test]
+fn mirrors_read_back() {
+    for scene in [looking_glass(5), tori(8)] {
+        assert_eq!(scene.validate(), Ok(()));
+        let imported = read_back(&scene);
+        assert!(imported.report.warnings.len() == 1 && imported.report.warnings[0].contains("mirrors"));
+        let glosses = |scene: &Scene| scene.materials.iter().map(|material| material.gloss).collect::<Vec<_>>();
+        assert_eq!(glosses(&imported.scene), glosses(&scene));
     }
 }
 

@@ -112,7 +112,7 @@ impl AdaptiveSampler {
             return None;
         }
         let whole = Cell::around(size);
-        let place = jittered(&whole, size, options.seed);
+        let place = whole.jittered(size, options.seed);
         let radiance = evaluate(pixels(place)).radiance;
         let is_number = radiance.is_finite();
         let first = if is_number { radiance } else { Vec3::ZERO };
@@ -275,14 +275,8 @@ impl AdaptiveSampler {
         let Sample { place, radiance } = *self.tree.sample(self.tree.link_at(slot));
         let side = usize::from(halves[0].contains(place));
         let half = halves[side];
-        Some(Parting { slot, side, half, place: jittered(&half, self.size, self.seed), before: radiance })
+        Some(Parting { slot, side, half, place: half.jittered(self.size, self.seed), before: radiance })
     }
-}
-
-/// A place anywhere in a cell.
-fn jittered(cell: &Cell, size: [u32; 2], seed: u64) -> [u32; 2] {
-    let number = scatter(seed, cell.number());
-    cell.place(size, [number as u32, (number >> 32) as u32])
 }
 
 /// Keeps the cells that are worth a sample before others are looked at again.

@@ -5,6 +5,8 @@
 
 use glam::DVec2;
 
+use crate::sequence::scatter;
+
 /// Units that a pixel is wide, as a power of two. Sides of 2¹⁴ pixels and this fill 32 bits; cells a hundred times smaller than
 /// the smallest that a picture ever needs are still whole.
 pub(crate) const PIXEL: u8 = 18;
@@ -101,6 +103,12 @@ impl Cell {
             let side = self.end(axis, size) - u64::from(self.corner[axis]);
             self.corner[axis] + ((side * u64::from(numbers[axis])) >> 32) as u32
         })
+    }
+
+    /// A place anywhere in the part within a picture, the same for the same seed; units.
+    pub fn jittered(&self, size: [u32; 2], seed: u64) -> [u32; 2] {
+        let number = scatter(seed, self.number());
+        self.place(size, [number as u32, (number >> 32) as u32])
     }
 
     /// Whether a place lies in the cell.

@@ -14,31 +14,20 @@
 //!   element: the paper parts it and hands the element down.
 //! - Blocks share the pixels of their boundaries, and blend what is evaluated there (Coons) where the paper is bilinear.
 
-use std::ops::Range;
-
-use glam::{DVec2, Vec2, Vec3};
+use glam::{DVec2, Vec3};
 use rayon::prelude::*;
 use scene::{Display, Exposure, ToneCurve, luminance};
 
 use crate::block::{Block, ELEMENTARY};
 use crate::cell::MOST_PIXELS;
+use crate::coherence_step::Step;
 use crate::evaluation::Evaluation;
 use crate::line_grid::LineGrid;
-use crate::oriented_element::{Boundary, unit_vector};
-use crate::simplicity::{Simplicity, simplicity};
 use crate::visible_lines::VisibleLine;
 use crate::work_image::{WorkImage, WorkPixel};
 
 /// Contrast of a block's corners from which on it is an edge block (Guo's t_c).
-const CONTRAST: f32 = 0.05;
-
-/// Contrast of two pixels of a boundary from which on those between them are evaluated: finer than that of a block, for light
-/// that is taken for linear here is so in the picture.
-const FINE_CONTRAST: f32 = 0.02;
-
-/// How far the middle of two pixels of a boundary may lie from their mean, relative to its luminance as shown, for light
-/// between them to be linear.
-const LINEAR: f32 = 0.02;
+pub(crate) const CONTRAST: f32 = 0.05;
 
 /// How urgent blocks are, for the range of their light: those that are known to be complex and their parts, those that seem
 /// simple, and smooth ones; an elementary edge block has 1. Less for simple ones misses what is inside, more looks again at
@@ -54,10 +43,7 @@ const HIDDEN: f32 = 0.5;
 const INHERITED: f32 = 0.5;
 
 /// Luminance, as shown, that contrast is at least told in comparison to: a step of a display, below which nothing is seen.
-const DARK: f32 = 1.0 / 255.0;
-
-/// How far a simple block's pixel may lie from what its element says, relative to its luminance as shown (Guo's 1 %).
-const TOLERANCE: f32 = 0.01;
+pub(crate) const DARK: f32 = 1.0 / 255.0;
 
 /// Pixels of the first batches: work for some threads. With 512 a small image is spent on what was urgent before anything was
 /// known: a straight edge then has four times the error from a tenth of its pixels.
@@ -77,6 +63,14 @@ pub struct CoherenceOptions {
     pub curve: Option<ToneCurve>,
 }
 
+impl CoherenceOptions {
+    /// Light as it is compared: exposed, and by the curve of a display.
+    pub(crate) fn compared(&self, radiance: Vec3) -> Vec3 {
+        let Self { exposure, curve, .. } = *self;
+        curve.map_or(radiance * exposure.factor(), |curve| Display::new(exposure, curve).light(radiance))
+    }
+}
+
 /// A coherence map in the making.
 ///
 /// Asked for a batch of points ([`CoherenceMap::next_batch`]) and told what is seen there ([`CoherenceMap::take`]), until there
@@ -84,7 +78,7 @@ pub struct CoherenceOptions {
 pub struct CoherenceMap {
     pub(crate) options: CoherenceOptions,
     pub(crate) image: WorkImage,
-    lines: LineGrid,
+    pub(crate) lines: LineGrid,
     /// They fill the image.
     pub(crate) leaves: Vec<Leaf>,
     batch: Vec<[u32; 2]>,
@@ -111,18 +105,6 @@ pub(crate) enum Kind {
     Simple { direction: u8, grid: u32 },
     /// To be parted, every part with its boundary.
     Complex { direction: u8 },
-}
-
-/// What is to be done about a block.
-enum Step {
-    /// To evaluate some pixels.
-    Evaluate(Vec<[u32; 2]>),
-    /// To take it for something else.
-    Is(Kind),
-    /// To part it into such blocks.
-    Part(Kind),
-    /// Nothing: every pixel is evaluated.
-    Done,
 }
 
 impl CoherenceMap {
@@ -176,13 +158,18 @@ impl CoherenceMap {
         let batch: Vec<_> = std::mem::take(&mut self.batch).into_iter().zip(seen).collect();
         let (numbers, others): (Vec<_>, Vec<_>) = batch.into_iter().partition(|(_, seen)| seen.radiance.is_finite());
         for (pixel, &Evaluation { radiance, object, .. }) in numbers {
-            self.image.insert(pixel, WorkPixel { radiance, object });
+            self.insert(pixel, radiance, object);
         }
         self.excluded += others.len() as u64;
         for (pixel, &Evaluation { object, .. }) in others {
             let radiance = self.radiance_near(pixel);
-            self.image.insert(pixel, WorkPixel { radiance, object });
+            self.insert(pixel, radiance, object);
         }
+    }
+
+    fn insert(&mut self, pixel: [u32; 2], radiance: Vec3, object: u32) {
+        let shown = self.shown(radiance);
+        self.image.insert(pixel, WorkPixel { radiance, shown, object });
     }
 
     /// Pixels of the work image that are evaluated.
@@ -228,18 +215,12 @@ impl CoherenceMap {
     }
 
     /// The luminance that a display shows.
-    fn shown(&self, radiance: Vec3) -> f32 {
-        luminance(self.compared(radiance).as_dvec3()) as f32
+    pub(crate) fn shown(&self, radiance: Vec3) -> f32 {
+        luminance(self.options.compared(radiance).as_dvec3()) as f32
     }
 
-    /// Light as it is compared: exposed, and by the curve of a display.
-    fn compared(&self, radiance: Vec3) -> Vec3 {
-        let CoherenceOptions { exposure, curve, .. } = self.options;
-        curve.map_or(radiance * exposure.factor(), |curve| Display::new(exposure, curve).light(radiance))
-    }
-
-    fn look(&self, pixel: [u32; 2]) -> Option<(f32, u32)> {
-        self.image.get(pixel).map(|pixel| (self.shown(pixel.radiance), pixel.object))
+    pub(crate) fn look(&self, pixel: [u32; 2]) -> Option<(f32, u32)> {
+        self.image.get(pixel).map(|pixel| (pixel.shown, pixel.object))
     }
 
     /// The radiance of an evaluated pixel near another, at a power of two of pixels along rows, columns and diagonals, where
@@ -326,133 +307,10 @@ impl CoherenceMap {
         let seen = (0..block.perimeter()).filter_map(|step| self.look(block.on_boundary(step)));
         seen.fold([f32::MAX, 0.0], |[low, high], (light, _)| [low.min(light), high.max(light)])
     }
-
-    fn step(&self, leaf: &Leaf) -> Step {
-        let block = &leaf.block;
-        if block.is_pixel() {
-            let missing = self.missing(block.corners().into_iter());
-            return if missing.is_empty() { Step::Done } else { Step::Evaluate(missing) };
-        }
-        match leaf.kind {
-            Kind::Smooth => self.parted(block, Kind::Smooth),
-            Kind::Edge if block.sides().into_iter().max() <= Some(2) => self.parted(block, Kind::Smooth),
-            Kind::Edge => self.test(block),
-            Kind::Simple { direction, grid } => self.verify(block, direction, grid),
-            Kind::Complex { .. } => self.parted(block, Kind::Edge),
-        }
-    }
-
-    /// Parts a block once the corners of its parts are evaluated.
-    fn parted(&self, block: &Block, kind: Kind) -> Step {
-        let missing = self.missing(block.parts().flat_map(|part| part.corners()));
-        if missing.is_empty() { Step::Part(kind) } else { Step::Evaluate(missing) }
-    }
-
-    fn missing(&self, pixels: impl Iterator<Item = [u32; 2]>) -> Vec<[u32; 2]> {
-        pixels.filter(|&pixel| !self.image.has(pixel)).collect()
-    }
-
-    /// Evaluates an edge block's boundary, and tells whether it is simple.
-    fn test(&self, block: &Block) -> Step {
-        let count = block.perimeter();
-        let around = |step: u32| block.on_boundary(step % count);
-        let mut missing = Vec::new();
-        let ([left, top], [right, bottom]) = (block.low, block.high);
-        for y in [top, bottom] {
-            self.bisect(&|x| [x, y], left..right, true, &mut missing);
-        }
-        for x in [left, right] {
-            self.bisect(&|y| [x, y], top..bottom, true, &mut missing);
-        }
-        if !missing.is_empty() {
-            return Step::Evaluate(missing);
-        }
-        let boundary = Boundary::of(block, &self.image);
-        let mut object = 0;
-        let values: Vec<(f32, u32)> = (0..count)
-            .zip(boundary.values())
-            .map(|(step, radiance)| {
-                object = self.image.get(around(step)).map_or(object, |pixel| pixel.object);
-                (self.shown(*radiance), object)
-            })
-            .collect();
-        let is_even = contrast(values.iter().map(|value| value.0)) <= CONTRAST;
-        match simplicity(block, &values, is_even, &|pixel| self.look(pixel)) {
-            Simplicity::Wants(pixels) => Step::Evaluate(pixels),
-            Simplicity::Simple => Step::Is(Kind::Simple { direction: self.direction(&boundary), grid: ELEMENTARY }),
-            Simplicity::Complex => Step::Is(Kind::Complex { direction: self.direction(&boundary) }),
-        }
-    }
-
-    /// What is missing between two evaluated pixels of a side: the middle, if it `is_wanted`, and once that is known the
-    /// middles of the halves, if there is more in them than a line.
-    fn bisect(&self, at: &dyn Fn(u32) -> [u32; 2], side: Range<u32>, is_wanted: bool, missing: &mut Vec<[u32; 2]>) {
-        let length = side.end - side.start;
-        if length < 2 || !is_wanted {
-            return;
-        }
-        let middle = side.start + length.div_ceil(2).next_power_of_two();
-        let [first, half, last] = [side.start, middle, side.end].map(|place| self.look(at(place)));
-        let Some(half) = half else { return missing.push(at(middle)) };
-        let (first, last) = (first.unwrap_or_default(), last.unwrap_or_default());
-        let part = (middle - side.start) as f32 / length as f32;
-        let said = first.0 + (last.0 - first.0) * part;
-        let is_bent = (half.0 - said).abs() > LINEAR * (half.0 + DARK);
-        for (ends, part) in [([first, half], side.start..middle), ([half, last], middle..side.end)] {
-            let differs = contrast(ends.iter().map(|end| end.0)) > FINE_CONTRAST;
-            let block = Block { low: at(part.start), high: at(part.end) };
-            let is_wanted = ends[0].1 != ends[1].1 || (is_bent && differs) || self.lines.crosses(&block);
-            self.bisect(at, part, is_wanted, missing);
-        }
-    }
-
-    fn direction(&self, boundary: &Boundary) -> u8 {
-        boundary.least_discrepancy(|radiance| self.compared(radiance))
-    }
-
-    /// Looks at a simple block on the next finer grid: it stays simple while its element says what is there.
-    fn verify(&self, block: &Block, direction: u8, grid: u32) -> Step {
-        let finer = grid / 2;
-        if finer == 0 {
-            return Step::Done;
-        }
-        let inside = |block: &Block| {
-            let ([left, top], [right, bottom]) = (block.low, block.high);
-            (top..=bottom).flat_map(move |y| (left..=right).map(move |x| [x, y]))
-        };
-        let missing = self.missing(inside(block).filter(|pixel| is_on_grid(block, *pixel, finer)));
-        if !missing.is_empty() {
-            return Step::Evaluate(missing);
-        }
-        let boundary = Boundary::of(block, &self.image);
-        let is_as_said = |pixel: [u32; 2]| {
-            let said = self.shown(boundary.along(unit_vector(direction), place(block, pixel)));
-            let is = self.look(pixel).map_or(said, |seen| seen.0);
-            (said - is).abs() <= TOLERANCE * is.max(DARK)
-        };
-        let is_inner =
-            |[x, y]: &[u32; 2]| block.low[0] < *x && *x < block.high[0] && block.low[1] < *y && *y < block.high[1];
-        let mut inner = inside(block).filter(|pixel| is_inner(pixel) && is_on_grid(block, *pixel, finer));
-        if inner.all(is_as_said) {
-            Step::Is(Kind::Simple { direction, grid: finer })
-        } else {
-            self.parted(block, Kind::Edge)
-        }
-    }
-}
-
-/// Where a pixel lies in a block, steps from its upper left corner.
-pub(crate) fn place(block: &Block, [x, y]: [u32; 2]) -> Vec2 {
-    Vec2::new((x - block.low[0]) as f32, (y - block.low[1]) as f32)
-}
-
-/// Whether a pixel lies on a grid over a block of so many steps, or on the grid's end.
-fn is_on_grid(block: &Block, pixel: [u32; 2], grid: u32) -> bool {
-    (0..2).all(|axis| (pixel[axis] - block.low[axis]).is_multiple_of(grid) || pixel[axis] == block.high[axis])
 }
 
 /// Contrast of luminances as shown (Mitchell 1987): (high − low) ÷ (high + low).
-fn contrast(luminances: impl Iterator<Item = f32>) -> f32 {
+pub(crate) fn contrast(luminances: impl Iterator<Item = f32>) -> f32 {
     let (low, high) = luminances.fold((f32::MAX, 0f32), |(low, high), light| (low.min(light), high.max(light)));
     if low > high { 0.0 } else { (high - low) / (high + low + DARK) }
 }

@@ -8,7 +8,8 @@ use rayon::prelude::*;
 use scene::Display;
 
 use crate::block::{Block, ELEMENTARY};
-use crate::coherence_map::{CoherenceMap, Kind, Leaf, place};
+use crate::coherence_map::{CoherenceMap, Kind, Leaf};
+use crate::coherence_step::place;
 use crate::filter::Filter;
 use crate::oriented_element::{Boundary, DIRECTIONS, unit_vector};
 use crate::reduction::Reduction;

@@ -1,7 +1,7 @@
 //! What an eye sees along its rays: points of surfaces, with the texture that lies there.
 
 use glam::{DVec2, DVec3};
-use scene::{Bvh, Camera, Ray, Rgb, Scene, TextureMap};
+use scene::{Bvh, Camera, Hit, Ray, Rgb, Scene, TextureMap};
 
 use crate::evaluation::Evaluation;
 use crate::surface::{Receiver, SurfacePoint, Surfaces};
@@ -67,12 +67,17 @@ impl<'a> Eye<'a> {
         self.scene().environment.as_ref().map_or(Rgb::ZERO, |environment| environment.seen(direction))
     }
 
+    /// How far before the eye a position is, along its line of sight, metres; negative behind it.
+    pub(crate) fn depth(&self, position: DVec3) -> f64 {
+        self.camera.basis().2.dot(position - self.camera.eye)
+    }
+
     /// The point of the image plane, pixels, where a position before the eye is seen.
     pub(crate) fn project(&self, position: DVec3) -> DVec2 {
-        let (right, up, forward) = self.camera.basis();
+        let (right, up, _) = self.camera.basis();
         let way = position - self.camera.eye;
         let size = self.far_corner();
-        let scale = size.y / (2.0 * (self.camera.vertical_fov / 2.0).tan() * forward.dot(way));
+        let scale = size.y / (2.0 * (self.camera.vertical_fov / 2.0).tan() * self.depth(position));
         0.5 * size + DVec2::new(right.dot(way), -up.dot(way)) * scale
     }
 
@@ -99,8 +104,17 @@ impl<'a> Eye<'a> {
     /// What is seen from a point of a surface.
     pub(crate) fn look_from(&self, receiver: &Receiver, direction: DVec3) -> Sight {
         let ray = Ray { origin: receiver.position, direction };
-        let hit = self.surfaces.bvh.closest_hit_among(&ray, |id| !self.surfaces.is_on(receiver, id));
+        let hit = self.hit_from(receiver, &ray);
         hit.map_or(Sight::Background, |hit| self.sight(&ray, hit.id, hit.distance))
+    }
+
+    /// How far from a point of a surface the nearest other one in a direction is.
+    pub(crate) fn nearest_from(&self, receiver: &Receiver, direction: DVec3) -> Option<f64> {
+        self.hit_from(receiver, &Ray { origin: receiver.position, direction }).map(|hit| hit.distance)
+    }
+
+    fn hit_from(&self, receiver: &Receiver, ray: &Ray) -> Option<Hit> {
+        self.surfaces.bvh.closest_hit_among(ray, |id| !self.surfaces.is_on(receiver, id))
     }
 
     fn sight(&self, ray: &Ray, hit: u32, distance: f64) -> Sight {

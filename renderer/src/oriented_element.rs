@@ -54,7 +54,7 @@ impl Boundary {
 
     /// The light at a pixel so many steps right of and below the upper left corner, inside, by the scanline of a unit vector.
     pub fn along(&self, direction: Vec2, place: Vec2) -> Vec3 {
-        let ([ahead, behind], [from, to]) = self.ends(direction, place);
+        let ((ahead, from), (behind, to)) = (self.end(direction, place), self.end(-direction, place));
         (ahead * to + behind * from) / (from + to).max(f32::MIN_POSITIVE)
     }
 
@@ -72,24 +72,20 @@ impl Boundary {
         between + over - upper.lerp(lower, part.y)
     }
 
-    /// The light at both ends of a scanline, and how far they are.
-    fn ends(&self, direction: Vec2, place: Vec2) -> ([Vec3; 2], [f32; 2]) {
-        let end = |direction: Vec2| {
-            let room = Vec2::select(direction.cmpgt(Vec2::ZERO), self.sides - place, place);
-            let reach = room / direction.abs();
-            // A scanline along an axis never meets two of the sides; 0/0 is not less than anything.
-            if reach.y < reach.x || direction.x == 0.0 {
-                let x = (place.x + direction.x * reach.y).clamp(0.0, self.sides.x);
-                let step = if direction.y < 0.0 { x } else { 2.0 * self.sides.x + self.sides.y - x };
-                (self.between(step), reach.y)
-            } else {
-                let y = (place.y + direction.y * reach.x).clamp(0.0, self.sides.y);
-                let step = if direction.x > 0.0 { self.sides.x + y } else { self.count as f32 - y };
-                (self.between(step), reach.x)
-            }
-        };
-        let ((ahead, from), (behind, to)) = (end(direction), end(-direction));
-        ([ahead, behind], [from, to])
+    /// The light at the end of a scanline from a place on, and how far it is.
+    fn end(&self, direction: Vec2, place: Vec2) -> (Vec3, f32) {
+        let room = Vec2::select(direction.cmpgt(Vec2::ZERO), self.sides - place, place);
+        let reach = room / direction.abs();
+        // A scanline along an axis never meets two of the sides; 0/0 is not less than anything.
+        if reach.y < reach.x || direction.x == 0.0 {
+            let x = (place.x + direction.x * reach.y).clamp(0.0, self.sides.x);
+            let step = if direction.y < 0.0 { x } else { 2.0 * self.sides.x + self.sides.y - x };
+            (self.between(step), reach.y)
+        } else {
+            let y = (place.y + direction.y * reach.x).clamp(0.0, self.sides.y);
+            let step = if direction.x > 0.0 { self.sides.x + y } else { self.count as f32 - y };
+            (self.between(step), reach.x)
+        }
     }
 
     fn between(&self, step: f32) -> Vec3 {
@@ -102,19 +98,21 @@ impl Boundary {
         let (mut squares, mut total) = (0.0, 0.0);
         let [width, height] = [self.sides.x as usize, self.sides.y as usize];
         for step in 0..self.count {
-            let (place, width_of_line) = match step {
-                _ if step < width => (Vec2::new(step as f32, 0.0), direction.y.abs()),
-                _ if step < width + height => (Vec2::new(self.sides.x, (step - width) as f32), direction.x.abs()),
+            // How far a scanline goes into the block for each step along it.
+            let (place, depth) = match step {
+                _ if step < width => (Vec2::new(step as f32, 0.0), direction.y),
+                _ if step < width + height => (Vec2::new(self.sides.x, (step - width) as f32), -direction.x),
                 _ if step < 2 * width + height => {
-                    (Vec2::new((2 * width + height - step) as f32, self.sides.y), direction.y.abs())
+                    (Vec2::new((2 * width + height - step) as f32, self.sides.y), -direction.y)
                 }
-                _ => (Vec2::new(0.0, (self.count - step) as f32), direction.x.abs()),
+                _ => (Vec2::new(0.0, (self.count - step) as f32), direction.x),
             };
+            let width_of_line = depth.abs();
             if width_of_line < 1e-3 {
                 continue;
             }
-            let [ahead, behind] = self.ends(direction, place).0;
-            squares += width_of_line * (ahead - behind).length_squared();
+            let (far, _) = self.end(direction * depth.signum(), place);
+            squares += width_of_line * (self.values[step] - far).length_squared();
             total += width_of_line;
         }
         squares / total
@@ -159,7 +157,7 @@ mod tests {
         let around = (0..block.perimeter()).map(|step| block.on_boundary(step));
         for [x, y] in around.filter(|pixel| all || block.corners().contains(pixel)) {
             let radiance = Vec3::splat(light((x - 3) as f32, (y - 2) as f32));
-            image.insert([x, y], WorkPixel { radiance, object: 1 });
+            image.insert([x, y], WorkPixel { radiance, shown: radiance.x, object: 1 });
         }
         let boundary = Boundary::of(&block, &image);
         (block, boundary)

@@ -15,19 +15,23 @@ const STEP: f64 = 2.0;
 
 /// How much nearer than a point something must be to hide it, as a fraction of the distance: more shows edges behind thin
 /// plates, less hides those at contacts.
-const NEARER: f64 = 1e-3;
+pub(crate) const NEARER: f64 = 1e-3;
 
 /// The nearest that a point may be to the eye, as a fraction of the scene's size.
-const NEAR: f64 = 1e-4;
+pub(crate) const NEAR: f64 = 1e-4;
 
 /// A straight line of the image plane, from point to point, pixels of the picture.
 pub type VisibleLine = [DVec2; 2];
 
 /// Edges of a scene's polygons that an eye may see: where one object ends, or turns away from the eye.
 pub fn object_edges(eye: &Eye<'_>) -> Vec<[DVec3; 2]> {
+    edges_from(eye, &HalfEdges::new(eye.scene()), eye.camera().eye)
+}
+
+/// Such edges as they are seen from a place.
+pub(crate) fn edges_from(eye: &Eye<'_>, half_edges: &HalfEdges, place: DVec3) -> Vec<[DVec3; 2]> {
     let scene = eye.scene();
-    let half_edges = HalfEdges::new(scene);
-    let looks = |polygon: u32| (eye.object(polygon), scene.plane(polygon).distance(eye.camera().eye) > 0.0);
+    let looks = |polygon: u32| (eye.object(polygon), scene.plane(polygon).distance(place) > 0.0);
     let is_edge = |half_edge: usize| match half_edges.neighbour(half_edge as u32) {
         None => true,
         // Once for both.
@@ -43,32 +47,37 @@ pub fn object_edges(eye: &Eye<'_>) -> Vec<[DVec3; 2]> {
 
 /// What an eye sees of segments, metres.
 pub fn visible_lines(eye: &Eye<'_>, segments: &[[DVec3; 2]]) -> Vec<VisibleLine> {
-    segments.par_iter().flat_map_iter(|segment| pieces(eye, segment)).collect()
+    segments.par_iter().flat_map_iter(|segment| seen_pieces(eye, segment)).collect()
 }
 
 /// The visible pieces of a segment.
-fn pieces(eye: &Eye<'_>, segment: &[DVec3; 2]) -> Vec<VisibleLine> {
-    let camera = eye.camera();
-    let (_, _, forward) = camera.basis();
-    let depths = segment.map(|end| forward.dot(end - camera.eye));
+fn seen_pieces(eye: &Eye<'_>, segment: &[DVec3; 2]) -> Vec<VisibleLine> {
+    let is_visible = |ray: &Ray| {
+        let distance = distance_along(ray, segment);
+        eye.nearest(ray).is_none_or(|hit| hit >= distance * (1.0 - NEARER))
+    };
+    pieces(eye, segment, [DVec2::ZERO, eye.far_corner()], is_visible)
+}
+
+/// The pieces of a segment's picture, within a rectangle, that are visible along rays through them.
+pub(crate) fn pieces(
+    eye: &Eye<'_>,
+    segment: &[DVec3; 2],
+    [low, high]: [DVec2; 2],
+    is_visible: impl Fn(&Ray) -> bool,
+) -> Vec<VisibleLine> {
     let near = NEAR * eye.scene().size();
-    let Some((enter, leave)) = within([0.0, 1.0], depths[0] - near, depths[1] - near) else { return Vec::new() };
-    let [from, to] = [enter, leave].map(|place| eye.project(segment[0].lerp(segment[1], place)));
-    let size = eye.far_corner();
-    let inside = within([0.0, 1.0], from.x, to.x)
-        .and_then(|(enter, leave)| within([enter, leave], size.x - from.x, size.x - to.x))
-        .and_then(|(enter, leave)| within([enter, leave], from.y, to.y))
-        .and_then(|(enter, leave)| within([enter, leave], size.y - from.y, size.y - to.y));
-    let Some((enter, leave)) = inside else { return Vec::new() };
-    let (start, end) = (from.lerp(to, enter), from.lerp(to, leave));
+    let Some(before) = part_before(segment, segment.map(|end| eye.depth(end) - near)) else { return Vec::new() };
+    let [from, to] = before.map(|end| eye.project(end));
+    let inside = within([0.0, 1.0], from.x - low.x, to.x - low.x)
+        .and_then(|part| within(part, high.x - from.x, high.x - to.x))
+        .and_then(|part| within(part, from.y - low.y, to.y - low.y))
+        .and_then(|part| within(part, high.y - from.y, high.y - to.y));
+    let Some([start, end]) = inside.map(|part| part.map(|place| from.lerp(to, place))) else { return Vec::new() };
     let count = (start.distance(end) / STEP).ceil().max(1.0) as u32;
     let at = |place: f64| start.lerp(end, place / f64::from(count));
     // Looked at in their middles: the ends lie on other edges.
-    let is_visible = |piece: u32| {
-        let ray = eye.ray(at(f64::from(piece) + 0.5));
-        let distance = distance_along(&ray, segment);
-        eye.nearest(&ray).is_none_or(|hit| hit >= distance * (1.0 - NEARER))
-    };
+    let is_visible = |piece: u32| is_visible(&eye.ray(at(f64::from(piece) + 0.5)));
     let mut lines = Vec::new();
     let mut open = None;
     for piece in 0..=count {
@@ -84,8 +93,13 @@ fn pieces(eye: &Eye<'_>, segment: &[DVec3; 2]) -> Vec<VisibleLine> {
     lines
 }
 
+/// The part of a segment before something that its ends are so far from.
+pub(crate) fn part_before(segment: &[DVec3; 2], [first, last]: [f64; 2]) -> Option<[DVec3; 2]> {
+    within([0.0, 1.0], first, last).map(|part| part.map(|place| segment[0].lerp(segment[1], place)))
+}
+
 /// The part of a range in which a linear function that has these values at 0 and at 1 is not negative.
-fn within([enter, leave]: [f64; 2], first: f64, last: f64) -> Option<(f64, f64)> {
+fn within([enter, leave]: [f64; 2], first: f64, last: f64) -> Option<[f64; 2]> {
     let root = first / (first - last);
     let (enter, leave) = match (first >= 0.0, last >= 0.0) {
         (true, true) => (enter, leave),
@@ -93,11 +107,11 @@ fn within([enter, leave]: [f64; 2], first: f64, last: f64) -> Option<(f64, f64)>
         (false, true) => (enter.max(root), leave),
         (false, false) => return None,
     };
-    (enter < leave).then_some((enter, leave))
+    (enter < leave).then_some([enter, leave])
 }
 
 /// How far along a ray the point is that is nearest to a segment's line.
-fn distance_along(ray: &Ray, [from, to]: &[DVec3; 2]) -> f64 {
+pub(crate) fn distance_along(ray: &Ray, [from, to]: &[DVec3; 2]) -> f64 {
     let (along, offset) = ((to - from).normalize_or_zero(), from - ray.origin);
     let cosine = ray.direction.dot(along);
     let sine = 1.0 - cosine * cosine;
@@ -106,17 +120,17 @@ fn distance_along(ray: &Ray, [from, to]: &[DVec3; 2]) -> f64 {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use scene::{Bvh, Camera};
 
     use super::*;
     use crate::path_trace::test_scenes::{grey, scene_of};
 
-    fn square(z: f64, half: f64) -> Vec<DVec3> {
+    pub fn square(z: f64, half: f64) -> Vec<DVec3> {
         [(-1., -1.), (1., -1.), (1., 1.), (-1., 1.)].map(|(x, y)| DVec3::new(x * half, y * half, z)).to_vec()
     }
 
-    fn length(lines: &[VisibleLine]) -> f64 {
+    pub fn length(lines: &[VisibleLine]) -> f64 {
         lines.iter().map(|[from, to]| from.distance(*to)).sum()
     }
 

@@ -13,6 +13,8 @@ const TILE: u32 = 8;
 pub(crate) struct WorkPixel {
     /// W·sr⁻¹·m⁻².
     pub radiance: Vec3,
+    /// Its luminance as it is compared: asked for more often than there are pixels.
+    pub shown: f32,
     /// What is seen there, as of [`crate::Evaluation`].
     pub object: u32,
 }
@@ -128,7 +130,7 @@ mod tests {
     fn pixels_are_found_again_in_any_order_and_never_overwritten() {
         let (width, height) = (21, 13);
         let mut image = WorkImage::new(width, height);
-        let value = |i: u32| WorkPixel { radiance: Vec3::splat(i as f32), object: i };
+        let value = |i: u32| WorkPixel { radiance: Vec3::splat(i as f32), shown: i as f32, object: i };
         let order = (0..width * height).map(|i| i * 101 % (width * height));
         for i in order.clone().take(100) {
             assert!(image.get([i % width, i / width]).is_none() && image.insert([i % width, i / width], value(i)));

@@ -75,6 +75,9 @@ pub struct RenderFlags {
     /// Full picture (.exr) that this one is compared with: the L1 and L2 norms of the difference, relative to its own
     #[arg(long, value_name = "FULL.exr")]
     pub compare: Option<PathBuf>,
+    /// Where a map of the difference goes, with --compare: blue where this picture is too dark, red where it is too bright
+    #[arg(long, value_name = "FILE.png", value_parser = png_path)]
+    pub error_map: Option<PathBuf>,
     /// Seed of all that is left to chance; the same seed gives the same picture
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub seed: u64,
@@ -119,9 +122,14 @@ pub struct CoherenceFlags {
     /// Where the map goes, with --sampler coherence-map: evaluated pixels white, blocks in the colour of their direction
     #[arg(long, value_name = "FILE.png", value_parser = png_path)]
     pub map: Option<PathBuf>,
+    /// Evaluate pixels of the work image over their area, by as many samples as it takes until they are known (--level,
+    /// --interval), with --sampler coherence-map: for light with noise, that of a full picture goes to the few pixels
+    #[arg(long)]
+    pub relocate: bool,
 }
 
-/// When the adaptive sampler takes a pixel for known: when its mean is within an interval with a probability.
+/// When the adaptive sampler, or a coherence map with --relocate, takes a pixel for known: when its mean is within an interval
+/// with a probability.
 #[derive(Clone, Copy, Debug, Args)]
 pub struct ConfidenceFlags {
     /// That probability, between 0 and 1

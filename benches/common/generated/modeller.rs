@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use glam::DVec3;
-use scene::{Camera, Material, NamedCamera, Polygon, Rgb, Scene};
+use scene::{Camera, Gloss, Material, NamedCamera, Polygon, Rgb, Scene};
 
 /// Places are rounded to this many a metre: coordinates of four decimals, which a text file holds in few digits.
 const GRID: f64 = 1e4;
@@ -42,6 +42,15 @@ impl Modeller {
         (material.reflectance, material.radiance) = (Rgb::from_array(reflectance), Rgb::from_array(radiance));
         self.scene.materials.push(material);
         self.scene.materials.len() as u32 - 1
+    }
+
+    /// A mirror, and what is diffuse beside it; its index.
+    pub fn mirror(&mut self, name: &str, diffuse: [f64; 3], specular: [f64; 3]) -> u32 {
+        let [diffuse, specular] = [diffuse, specular].map(Rgb::from_array);
+        let index = self.material(name, (diffuse + specular).to_array(), [0.0; 3]);
+        let gloss = Gloss { diffuse, specular, exponent: 0.0, is_mirror: true };
+        self.scene.materials[index as usize].gloss = Some(gloss);
+        index
     }
 
     /// The faces that follow belong to this object.

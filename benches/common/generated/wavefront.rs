@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use scene::Scene;
+use scene::{Rgb, Scene};
 
 /// The OBJ text; `library` is the name of the MTL file beside it.
 pub fn obj(scene: &Scene, library: &str) -> String {
@@ -45,11 +45,16 @@ pub fn obj(scene: &Scene, library: &str) -> String {
 
 /// The MTL text.
 pub fn mtl(scene: &Scene) -> String {
-    let mut text = String::from("# Kd: linear RGB reflectance; Ke: emitted radiance, W/(m^2 sr), front side only\n");
+    let mut text =
+        String::from("# Kd: linear RGB reflectance; Ks: mirrors; Ke: emitted radiance, W/(m^2 sr), front side only\n");
+    let numbers = |colour: Rgb| colour.to_array().map(|channel| channel.to_string()).join(" ");
     for material in &scene.materials {
-        let [reflectance, radiance] =
-            [material.reflectance, material.radiance].map(|v| v.to_array().map(|c| c.to_string()).join(" "));
-        let _ = writeln!(text, "\nnewmtl {}\nKd {reflectance}\nKe {radiance}", material.name);
+        let (name, radiance) = (&material.name, numbers(material.radiance));
+        let diffuse = numbers(material.gloss.map_or(material.reflectance, |gloss| gloss.diffuse));
+        let _ = writeln!(text, "\nnewmtl {name}\nKd {diffuse}\nKe {radiance}");
+        if let Some(gloss) = material.gloss.filter(|gloss| gloss.is_mirror) {
+            let _ = writeln!(text, "Ks {}\nillum 3", numbers(gloss.specular));
+        }
     }
     text
 }

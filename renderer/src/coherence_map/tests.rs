@@ -1,6 +1,11 @@
+use std::cell::Cell;
+
 use super::*;
+use crate::confidence::Interval;
 use crate::filter::Filter;
+use crate::pixel_integral::PixelIntegral;
 use crate::reduction::Reduction;
+use crate::sequence::scatter;
 use crate::test_pictures::{disk, display, holes};
 
 fn usual(supersample: u32) -> CoherenceOptions {
@@ -159,4 +164,27 @@ fn a_part_of_a_batch_may_be_taken() {
     assert_eq!(map.evaluated(), 3, "the rest is forgotten");
     assert!(map.picture(Filter::Box, None).iter().all(|pixel| pixel.is_finite()));
     assert!(!map.next_batch(100).is_empty());
+}
+
+/// Light with noise: rays that a full picture spends one on every pixel make a better one of the few that they are enough for.
+#[test]
+fn relocated_rays_make_a_better_picture_than_those_of_a_full_one() {
+    let size = (160, 120);
+    let noise = |point: DVec2| (scatter(point.x.to_bits(), point.y.to_bits()) as f64 / u64::MAX as f64) as f32;
+    let evaluate = |point: DVec2| {
+        let seen = disk(point);
+        Evaluation { radiance: seen.radiance * (0.5 + noise(point)), ..seen }
+    };
+    let truth = refined(size, 3, usize::MAX, &disk).picture(Filter::Gaussian, None);
+    let full = refined(size, 3, usize::MAX, &evaluate);
+    let integral = PixelIntegral::new(&usual(3), 0.99, Interval::Linear(0.1), 1);
+    let spent = Cell::new(0);
+    let relocated = refined(size, 3, full.pixels() / 20, &|point| {
+        let seen = integral.mean(point, &evaluate);
+        spent.set(spent.get() + seen.cost as usize);
+        seen
+    });
+    assert!(spent.get() <= full.pixels(), "{} rays for {} pixels", spent.get(), full.pixels());
+    let [of_full, of_relocated] = [full, relocated].map(|map| errors(&map.picture(Filter::Gaussian, None), &truth));
+    assert!((0..2).all(|norm| of_relocated[norm] < 0.9 * of_full[norm]), "{of_relocated:?}, and full {of_full:?}");
 }

@@ -1,26 +1,29 @@
 //! Directional coherence maps: the table of Guo 1998 again, beside adaptive sampling with as many samples.
 //!
 //! `cargo bench --workspace --bench coherence` prints a page for data/record/: direct light, exact at every pixel. `-- bounces`
-//! gathers all light, in pictures of half the side, for half an hour of processor time.
+//! gathers all light, in pictures of half the side, for half an hour of processor time; `-- relocation` compares pictures with
+//! noise, `-- mirrors` those of flat and curved mirrors.
 
 #![allow(clippy::print_stdout, clippy::unwrap_used)]
 
+#[path = "../common/mod.rs"]
 mod common;
-#[path = "../src/point_gather.rs"]
+mod discontinuities;
+#[allow(unused_imports, reason = "of the scenes two are looked at")]
+#[path = "../common/generated/mod.rs"]
+mod generated;
+mod mirrors;
+mod pictures;
+#[path = "../../src/point_gather.rs"]
 mod point_gather;
+mod relocation;
 
-use glam::{DVec2, Vec3};
+use glam::Vec3;
+use pictures::{Compared, errors, picture, rmse, seen_at, timed};
 use point_gather::PointGather;
-use rayon::prelude::*;
-use renderer::{
-    AdaptiveOptions, AdaptiveSampler, CoherenceMap, CoherenceOptions, Evaluation, Evaluator, Eye, Film, Filter,
-    object_edges, visible_lines,
-};
+use renderer::{AdaptiveOptions, AdaptiveSampler, Evaluator, Eye, Film, Filter};
 use scene::{Bvh, Display, Exposure, ToneCurve, luminance};
 use solver::{Gather, SolveOptions};
-
-/// Pixels of the work image along a side of the picture's.
-const SUPERSAMPLE: u32 = 3;
 
 /// Side of the pictures, pixels.
 const SIDE: u32 = 512;
@@ -29,15 +32,25 @@ const SIDE: u32 = 512;
 const SHARES: [f64; 4] = [0.02, 0.03, 0.04, 0.06];
 
 fn main() {
-    let bounces = std::env::args().skip(1).any(|argument| argument == "bounces");
-    let side = if bounces { SIDE / 2 } else { SIDE };
+    let part = std::env::args().skip(1).find(|argument| !argument.starts_with('-'));
     println!("# Directional coherence maps\n");
     println!("{}", common::machine());
     println!("Command: `cargo bench --workspace --bench coherence`, {}.\n", env!("CARGO_PKG_VERSION"));
+    match part.as_deref() {
+        None => tables(Some(0), SIDE),
+        Some("bounces") => tables(None, SIDE / 2),
+        Some("relocation") => relocation::run(),
+        Some("mirrors") => mirrors::run(),
+        Some("discontinuities") => discontinuities::run(),
+        Some(other) => panic!("{other} is no part; give bounces, relocation, mirrors or discontinuities, or nothing"),
+    }
+}
+
+/// The paper's table 1 for both scenes, with so many interreflections.
+fn tables(bounces: Option<u32>, side: u32) {
     for name in ["shelf_office", "gallery"] {
         let scene = formats::read_scene(&common::file(&format!("data/scenes/{name}.obj"))).unwrap().scene;
-        let options = SolveOptions { link_error: None, bounces: (!bounces).then_some(0) };
-        let solution = solver::solve(&scene, &options, &|_| {});
+        let solution = solver::solve(&scene, &SolveOptions { link_error: None, bounces }, &|_| {});
         let gather = Gather::new(&scene, &solution);
         let points = PointGather::new(&scene, &solution, &gather);
         let bvh = Bvh::of_scene(&scene);
@@ -82,34 +95,6 @@ fn table(name: &str, eye: &Eye<'_>, side: u32, evaluate: &Evaluator<'_>) {
     println!();
 }
 
-/// How light is compared.
-struct Compared {
-    exposure: Exposure,
-    curve: Option<ToneCurve>,
-}
-
-struct Made {
-    map: CoherenceMap,
-    /// Seconds of all but evaluation, visible lines included.
-    of_map: f64,
-}
-
-fn picture(eye: &Eye<'_>, side: u32, most: usize, compared: Compared, evaluate: &Evaluator<'_>) -> Made {
-    let Compared { exposure, curve } = compared;
-    let options = CoherenceOptions { supersample: SUPERSAMPLE, exposure, curve };
-    let (lines, mut of_map) = timed(|| visible_lines(eye, &object_edges(eye)));
-    let mut map = CoherenceMap::new(side, side, &options, &lines).unwrap();
-    loop {
-        let (batch, placing) = timed(|| map.next_batch(most - map.evaluated()));
-        if batch.is_empty() {
-            return Made { map, of_map };
-        }
-        let seen = seen_at(&batch, evaluate);
-        let ((), taking) = timed(|| map.take(&seen));
-        of_map += placing + taking;
-    }
-}
-
 fn adaptive(side: u32, most: usize, display: Display, evaluate: &Evaluator<'_>) -> Vec<Vec3> {
     let mut sampler = AdaptiveSampler::new(side, side, &AdaptiveOptions::of(display), evaluate).unwrap();
     loop {
@@ -122,29 +107,4 @@ fn adaptive(side: u32, most: usize, display: Display, evaluate: &Evaluator<'_>) 
     let mut film = Film::new(side, side, Filter::Gaussian, Some(display));
     film.add(&sampler.tiles());
     film.picture()
-}
-
-fn seen_at(points: &[DVec2], evaluate: &Evaluator<'_>) -> Vec<Evaluation> {
-    points.par_iter().map(|&point| evaluate(point)).collect()
-}
-
-/// L1 and L2 norms of the difference, relative to the full picture's.
-fn errors(picture: &[Vec3], full: &[Vec3]) -> [f64; 2] {
-    let sum =
-        |of: &dyn Fn(Vec3, Vec3) -> f32| picture.iter().zip(full).map(|(a, b)| f64::from(of(*a, *b))).sum::<f64>();
-    let l1 = sum(&|a, b| (a - b).abs().element_sum()) / sum(&|_, b| b.element_sum());
-    [l1, (sum(&|a, b| (a - b).length_squared()) / sum(&|_, b| b.length_squared())).sqrt()]
-}
-
-/// The root mean square of the difference of what is shown.
-fn rmse(picture: &[Vec3], truth: &[Vec3]) -> f64 {
-    let squares = picture.iter().zip(truth).map(|(a, b)| f64::from((*a - *b).length_squared()) / 3.0);
-    (squares.sum::<f64>() / truth.len() as f64).sqrt()
-}
-
-/// Runs work; the seconds that it takes.
-fn timed<T>(work: impl FnOnce() -> T) -> (T, f64) {
-    let start = std::time::Instant::now();
-    let done = work();
-    (done, start.elapsed().as_secs_f64())
 }
