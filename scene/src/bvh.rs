@@ -104,6 +104,11 @@ impl Bvh {
         self.closest(ray, |_, distance| distance > nearest)
     }
 
+    /// The same among the triangles whose id `accept` takes.
+    pub fn closest_hit_beyond(&self, ray: &Ray, nearest: f64, accept: impl Fn(u32) -> bool) -> Option<Hit> {
+        self.closest(ray, |id, distance| distance > nearest && accept(id))
+    }
+
     fn closest(&self, ray: &Ray, accept: impl Fn(u32, f64) -> bool) -> Option<Hit> {
         let mut best: Option<(f64, usize, f64, f64)> = None;
         let sheared = ShearedRay::new(ray);

@@ -225,7 +225,7 @@ mod tests {
     use super::*;
     use crate::{
         Evaluator, draw_on_cpu,
-        test_room::{camera, room, room_under_sky, textured_room},
+        test_room::{camera, room, room_of_sheets, room_under_sky, textured_room},
     };
 
     /// An adapter; none, loudly, where there is none and HALFLIGHT_REQUIRE_GPU does not ask for one.
@@ -267,7 +267,9 @@ mod tests {
 
     /// All modes, and rooms for each.
     fn in_every_mode() -> impl Iterator<Item = (Mode, Baked)> {
-        Mode::ALL.into_iter().flat_map(|mode| [room(), textured_room(), room_under_sky()].map(|room| (mode, room)))
+        Mode::ALL
+            .into_iter()
+            .flat_map(|mode| [room(), textured_room(), room_under_sky(), room_of_sheets()].map(|room| (mode, room)))
     }
 
     /// Pixels that are off by more than 1/255.

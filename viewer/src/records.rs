@@ -1,7 +1,7 @@
 //! What the passes read: flat arrays of f32, made from a bake when it is loaded, the same for GPU and CPU.
 
 use bytemuck::{Pod, Zeroable};
-use scene::{Baked, EdgeKind, Interpolant, LineKind, Rgb};
+use scene::{Baked, EdgeKind, Interpolant, LineKind, Rgb, other_sides};
 
 use crate::{
     id_mesh::IdMesh,
@@ -30,7 +30,8 @@ pub(crate) struct TriangleRecord {
     /// [`TexturePlace::corners`].
     pub texture_corners: u32,
     pub f: [f32; 3],
-    pub padding_f: u32,
+    /// 1 where its back is the other side of the same surface, and never seen.
+    pub is_sheet: u32,
     /// ρ of the material, which its texture multiplies at the pixel; of the polygon where there is none.
     pub reflectance: [f32; 3],
     pub padding_reflectance: u32,
@@ -66,6 +67,8 @@ impl Records {
     pub fn of(baked: &Baked) -> Self {
         let weights = WeightRange::of(baked);
         let (mut textures, places) = texture_words(baked);
+        let other_sides = other_sides(&baked.scene);
+        let is_sheet = |id: u32| other_sides[baked.triangles[id as usize].polygon as usize].is_some();
         let (is_textured, sky) = (!textures.is_empty(), append_sky(&mut textures, sky_words(baked)));
         let triangle = |id: u32| {
             let triangle = &baked.triangles[id as usize];
@@ -84,6 +87,7 @@ impl Records {
                 d,
                 e2,
                 f,
+                is_sheet: is_sheet(id).into(),
                 element: triangle.element,
                 texels: place.texels,
                 texture_size: place.size,
@@ -105,7 +109,7 @@ impl Records {
         Self {
             triangles: ids.clone().map(triangle).collect(),
             corners: ids.map(|id| baked.corners(id).map(|corner| corner.as_vec3().to_array())).collect(),
-            mesh: IdMesh::of(baked),
+            mesh: IdMesh::of(baked, is_sheet),
             elements: baked.elements.iter().map(element).collect(),
             textures,
             is_textured,

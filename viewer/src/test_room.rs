@@ -63,6 +63,30 @@ pub(crate) fn room_under_sky() -> Baked {
     baked
 }
 
+/// The room with the other side of every wall, in triangles of its own: nowhere is a back side to be seen.
+pub(crate) fn room_of_sheets() -> Baked {
+    let mut baked = room();
+    let (polygons, triangles) = (baked.scene.polygons.len() as u32, baked.triangles.len());
+    for polygon in 0..polygons {
+        let record = baked.scene.polygons[polygon as usize];
+        let first_corner = baked.scene.corners.len() as u32;
+        // From another corner on, so that the diagonal of its triangles is the other one.
+        let reversed: Vec<u32> = [0, 3, 2, 1].map(|i| baked.scene.corners[(record.first_corner + i) as usize]).to_vec();
+        baked.scene.corners.extend(reversed);
+        baked.scene.polygons.push(Polygon { first_corner, ..record });
+    }
+    for pair in 0..triangles / 2 {
+        let [first, second] = [2 * pair, 2 * pair + 1].map(|id| baked.triangles[id]);
+        let ([a, b, c], d) = (first.vertices, second.vertices[2]);
+        let polygon = first.polygon + polygons;
+        let other = |vertices, triangle| BakedTriangle { vertices, polygon, ..triangle };
+        baked.triangles.extend([other([b, a, d], first), other([b, d, c], second)]);
+    }
+    baked.triangle_errors = vec![0.0; baked.triangles.len()];
+    baked.validate().expect("the room is a valid bake");
+    baked
+}
+
 /// A camera inside the room that sees its lamp.
 pub(crate) fn camera() -> Camera {
     Camera { eye: DVec3::new(0.31, 0.47, 1.13), target: DVec3::new(2.9, 2.4, 1.4), up: DVec3::Z, vertical_fov: 1.2 }

@@ -119,7 +119,14 @@ impl Twin {
     pub(crate) fn visibility(&self, camera: &Camera, place: Vec2, width: u32, height: u32) -> Seen {
         let ray = camera.ray(DVec2::new(place.x.into(), place.y.into()), width, height);
         let (.., forward) = camera.basis();
-        match self.bvh.closest_hit(&ray, NEAR / ray.direction.dot(forward)) {
+        // Of a sheet its other side is seen from behind.
+        let is_seen = |id: u32| {
+            self.records.triangles[id as usize].is_sheet == 0 || {
+                let [a, b, c] = self.records.corners[id as usize].map(|corner| Vec3::from(corner).as_dvec3());
+                (b - a).cross(c - a).dot(ray.direction) < 0.0
+            }
+        };
+        match self.bvh.closest_hit_beyond(&ray, NEAR / ray.direction.dot(forward), is_seen) {
             None => Seen::default(),
             Some(hit) => {
                 let back = if hit.normal.dot(ray.direction) < 0.0 { 0 } else { BACK };
@@ -299,7 +306,7 @@ mod tests {
     use scene::ToneCurve;
 
     use super::*;
-    use crate::test_room::{camera, room, room_under_sky};
+    use crate::test_room::{camera, room, room_of_sheets, room_under_sky};
 
     fn frame(mode: Mode) -> Frame {
         Frame { camera: camera(), width: 96, height: 64, mode, exposure: None, curve: ToneCurve::default() }
@@ -341,6 +348,17 @@ mod tests {
             let picture = draw_on_cpu(&room(), &Frame { camera: outside, ..frame(mode) });
             assert!(picture.background > 0 && picture.background < 96 * 64);
             assert!(picture.rgb.iter().all(|&rgb| rgb == [0; 3]));
+        }
+    }
+
+    #[test]
+    fn of_sheets_no_back_side_is_seen() {
+        let twin = Twin::new(&room_of_sheets());
+        for eye in [camera().eye, DVec3::new(-3.0, 1.6, 4.0)] {
+            let camera = Camera { eye, ..camera() };
+            let place = |i: usize| Vec2::new((i % 96) as f32 + 0.5, (i / 96) as f32 + 0.5);
+            let seen: Vec<u32> = (0..96 * 64).map(|i| twin.visibility(&camera, place(i), 96, 64).id).collect();
+            assert!(seen.iter().any(|&id| id != 0) && seen.iter().all(|&id| id & BACK == 0));
         }
     }
 

@@ -13,12 +13,14 @@ const REFLECTANCE = 6u;
 const EMITTED = 7u;
 
 // Rows by their fourth word: the leaf element, the classes of the edges, and the texture's first word of texels (0 for
-// no texture), its width with its height in the upper half, and its first word of the corners' coordinates.
+// no texture), its width with its height in the upper half, its first word of the corners' coordinates, and whether its back
+// is the other side of the same surface.
 const ELEMENT = 0u;
 const EDGES = 1u;
 const TEXELS = 2u;
 const TEXTURE_SIZE = 3u;
 const TEXTURE_CORNERS = 4u;
+const SHEET = 5u;
 
 fn numbers(id: u32, row: u32) -> vec3<f32> {
     return bitcast<vec3<f32>>(record(id, row).xyz);

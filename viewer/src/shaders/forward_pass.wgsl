@@ -28,7 +28,7 @@ fn sky_corner(index: u32) -> vec4<f32> {
     return vec4(f32(index & 1u) * 4.0 - 1.0, f32(index >> 1u) * 4.0 - 1.0, depth, 1.0);
 }
 
-// Back sides are black.
+// Back sides are black, but for those of sheets.
 @fragment
 fn pixel(
     @builtin(position) place: vec4<f32>,
@@ -39,6 +39,8 @@ fn pixel(
     var colour = vec3(0.0);
     if triangle == frame.triangles {
         colour = background(at);
+    } else if !front && word(triangle, SHEET) != 0u {
+        discard; // Its other side is seen there.
     } else if front {
         colour = colour_at(triangle, at);
     }

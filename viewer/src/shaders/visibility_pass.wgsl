@@ -6,7 +6,7 @@
 
 struct Corner {
     @invariant @builtin(position) clip: vec4<f32>,
-    // That of the triangle's first corner.
+    // That of the triangle's first corner; the top bit set where its back is the other side of the same surface.
     @location(0) @interpolate(flat) triangle: u32,
 }
 
@@ -16,8 +16,10 @@ fn corner(@location(0) position: vec3<f32>, @location(1) triangle: u32) -> Corne
     return Corner(frame.clip_from_eye * vec4(position - frame.eye, 1.0), triangle);
 }
 
-// The triangle's id plus one, the top bit set on back sides.
+// The triangle's id plus one, the top bit set on back sides. Where that of a sheet would be seen its other side is.
 @fragment
 fn pixel(in: Corner, @builtin(front_facing) front: bool) -> @location(0) u32 {
-    return in.triangle + select(0x80000001u, 1u, front);
+    let id = in.triangle & 0x7fffffffu;
+    if !front && id != in.triangle { discard; }
+    return id + select(0x80000001u, 1u, front);
 }
