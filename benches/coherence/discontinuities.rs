@@ -7,7 +7,7 @@ use scene::{Bvh, Exposure};
 use solver::{Gather, SolveOptions};
 
 use crate::common;
-use crate::pictures::{Compared, SUPERSAMPLE, errors, refined};
+use crate::pictures::{Compared, SUPERSAMPLE, columns, errors, refined};
 use crate::point_gather::PointGather;
 
 /// Side of the pictures, pixels.
@@ -45,15 +45,8 @@ pub fn run() {
         println!("{SIDE} × {SIDE} pixels of 3 × 3.\n");
         println!("| share | without: L1 | L2 | with them: L1 | L2 |\n|---|---|---|---|---|");
         for share in SHARES {
-            let [without, with] = [&edges, &all].map(|lines| errors(&picture(lines, share), &full));
-            println!(
-                "| {:.1} % | {:.4} | {:.4} | {:.4} | {:.4} |",
-                100.0 * share,
-                without[0],
-                without[1],
-                with[0],
-                with[1]
-            );
+            let of_both = [&edges, &all].map(|lines| errors(&picture(lines, share), &full));
+            println!("| {:.1} % | {} |", 100.0 * share, columns(&of_both));
         }
         println!();
     }

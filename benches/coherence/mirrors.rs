@@ -10,7 +10,7 @@ use scene::{Bvh, Exposure, Rgb, Scene};
 use solver::{Gather, SolveOptions};
 
 use crate::generated;
-use crate::pictures::{Compared, SUPERSAMPLE, errors, refined, seen_at};
+use crate::pictures::{Compared, SUPERSAMPLE, columns, errors, refined, seen_at};
 use crate::point_gather::PointGather;
 
 /// Side of the pictures, pixels.
@@ -49,16 +49,8 @@ fn flat() {
     println!("| share | without lines in the mirror: L1 | L2 | with them: L1 | L2 |");
     println!("|---|---|---|---|---|");
     for share in [0.03, 0.04, 0.06, 0.08] {
-        let [without, with] =
-            [&direct_lines, &all_lines].map(|lines| errors(&made(lines, most(share), evaluate), &full));
-        println!(
-            "| {:.1} % | {:.4} | {:.4} | {:.4} | {:.4} |",
-            100.0 * share,
-            without[0],
-            without[1],
-            with[0],
-            with[1]
-        );
+        let of_both = [&direct_lines, &all_lines].map(|lines| errors(&made(lines, most(share), evaluate), &full));
+        println!("| {:.1} % | {} |", 100.0 * share, columns(&of_both));
     }
     println!();
     beside_pixel_by_pixel(&all_lines, &full, evaluate);
@@ -77,8 +69,8 @@ fn curved() {
     println!("{} polygons, {SIDE} × {SIDE} pixels of 3 × 3, Whitted's rays.\n", scene.polygons.len());
     println!("| share | L1 | L2 |\n|---|---|---|");
     for share in [0.06, 0.1, 0.15, 0.2] {
-        let [l1, l2] = errors(&made(&lines, most(share), evaluate), &full);
-        println!("| {:.1} % | {l1:.4} | {l2:.4} |", 100.0 * share);
+        let error = errors(&made(&lines, most(share), evaluate), &full);
+        println!("| {:.1} % | {} |", 100.0 * share, columns(&[error]));
     }
     println!();
     beside_pixel_by_pixel(&lines, &full, evaluate);
@@ -90,15 +82,8 @@ fn beside_pixel_by_pixel(lines: &[VisibleLine], full: &[Vec3], evaluate: &Evalua
     println!("|---|---|---|---|---|---|");
     for multiple in MULTIPLES {
         let (share, picture) = pixel_by_pixel(lines, multiple * CONTRAST, evaluate);
-        let [theirs, ours] = [picture, made(lines, most(share), evaluate)].map(|picture| errors(&picture, full));
-        println!(
-            "| {multiple} | {:.1} % | {:.4} | {:.4} | {:.4} | {:.4} |",
-            100.0 * share,
-            theirs[0],
-            theirs[1],
-            ours[0],
-            ours[1]
-        );
+        let of_both = [picture, made(lines, most(share), evaluate)].map(|picture| errors(&picture, full));
+        println!("| {multiple} | {:.1} % | {} |", 100.0 * share, columns(&of_both));
     }
     println!();
 }

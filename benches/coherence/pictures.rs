@@ -67,3 +67,8 @@ pub fn timed<T>(work: impl FnOnce() -> T) -> (T, f64) {
     let done = work();
     (done, start.elapsed().as_secs_f64())
 }
+
+/// Columns of a table: L1 and L2 of each picture.
+pub fn columns(errors: &[[f64; 2]]) -> String {
+    errors.iter().map(|[l1, l2]| format!("{l1:.4} | {l2:.4}")).collect::<Vec<String>>().join(" | ")
+}

@@ -8,7 +8,7 @@ use scene::{Bvh, Exposure, Scene};
 use solver::{Gather, SolveOptions};
 
 use crate::common;
-use crate::pictures::{SUPERSAMPLE, errors, seen_at};
+use crate::pictures::{SUPERSAMPLE, columns, errors, seen_at};
 use crate::point_gather::PointGather;
 
 /// Side of the pictures, pixels: the truth takes an exact gather at six points of every pixel of the work image.
@@ -36,38 +36,33 @@ pub fn run() {
     let [truth, without_noise] = truth(&eye, &scene, &lines).map(|map| map.picture(Filter::Gaussian, None));
     println!("## shelf_office, all light, by paths\n");
     println!(
-        "{SIDE} × {SIDE} pixels of 3 × 3, the mean of {SEEDS} seeds. The full picture without noise, L1 and L2: {}.\n",
-        columns(errors(&without_noise, &truth), "and")
+        "{SIDE} × {SIDE} pixels of 3 × 3, the mean of {SEEDS} seeds. The full picture without noise: {}.\n",
+        columns(&[errors(&without_noise, &truth)])
     );
     println!("| paths a pixel | full: L1 | L2 | relocated: L1 | L2 | its share | its paths ÷ full |");
     println!("|---|---|---|---|---|---|---|");
     for (of_full, of_sample, interval) in WAYS {
-        let (mut full, mut relocated, mut share, mut spent) = ([0.0; 2], [0.0; 2], 0.0, 0.0);
+        let (mut means, mut share, mut spent) = ([[0.0; 2]; 2], 0.0, 0.0);
         for seed in 1..=SEEDS {
             let light = |samples| PathLight::new(&scene, &bvh, PathOptions { samples, bounces: None, seed });
             let [every, some] = [of_full, of_sample].map(light);
             let evaluate =
                 |light: &PathLight<'_>, point| eye.diffuse(point, |seen| (light.irradiance(seen), light.paths()));
             let (map, rays) = seen(&lines, u64::MAX, &|point| evaluate(&every, point));
-            let error = errors(&map.picture(Filter::Gaussian, None), &truth);
+            let full = map.picture(Filter::Gaussian, None);
             let integral = PixelIntegral::new(&options(), 0.99, interval, seed);
             let (map, of_map) = seen(&lines, rays, &|point| integral.mean(point, &|point| evaluate(&some, point)));
-            let of_relocated = errors(&map.picture(Filter::Gaussian, None), &truth);
-            for norm in 0..2 {
-                full[norm] += error[norm] / SEEDS as f64;
-                relocated[norm] += of_relocated[norm] / SEEDS as f64;
+            let relocated = map.picture(Filter::Gaussian, None);
+            let of_seed = [full, relocated].map(|picture| errors(&picture, &truth));
+            for (mean, error) in means.iter_mut().flatten().zip(of_seed.iter().flatten()) {
+                *mean += error / SEEDS as f64;
             }
             share += map.evaluated() as f64 / map.pixels() as f64 / SEEDS as f64;
             spent += of_map as f64 / rays as f64 / SEEDS as f64;
         }
-        let (full, relocated) = (columns(full, "|"), columns(relocated, "|"));
-        println!("| {of_full} | {full} | {relocated} | {:.1} % | {spent:.2} |", 100.0 * share);
+        println!("| {of_full} | {} | {:.1} % | {spent:.2} |", columns(&means), 100.0 * share);
     }
     println!();
-}
-
-fn columns([l1, l2]: [f64; 2], between: &str) -> String {
-    format!("{l1:.4} {between} {l2:.4}")
 }
 
 fn options() -> CoherenceOptions {
