@@ -32,6 +32,7 @@ mod real_scenes;
 mod reference;
 mod render;
 mod robustness;
+mod sky_bake;
 mod smooth_shading;
 mod textures;
 mod verify;
