@@ -327,7 +327,9 @@ impl Radiosity {
     fn received(&self, rows: &[&Row]) -> Vec<Rgb> {
         let part = |seen: &Seen| {
             let [middle, along_u, along_v] = self.0[seen.node as usize];
-            (middle + along_u * seen.offset[0] + along_v * seen.offset[1]).max(Vec3::ZERO) * seen.form_factor
+            // Light that is linear and nowhere negative is nowhere more than twice its mean.
+            let there = middle + along_u * seen.offset[0] + along_v * seen.offset[1];
+            there.min(middle * 2.0).max(Vec3::ZERO) * seen.form_factor
         };
         rows.par_iter().with_min_len(64).map(|row| row.iter().map(part).sum::<Vec3>().as_dvec3()).collect()
     }

@@ -44,6 +44,9 @@ const NEGLIGIBLE: f64 = 2.0;
 /// it of those over the hemisphere.
 const AIMED_RAYS: [u32; 2] = [1, 2];
 
+/// What is seen is scaled by this at most, or its inverse: where few rays meet anything their number says little.
+const MOST_BALANCED: f64 = 1.25;
+
 /// How the points of one element look at reflectors.
 #[derive(Default)]
 pub(crate) struct View {
@@ -145,8 +148,9 @@ impl RayGather {
         let first = seen.len();
         let looked_at: Vec<NodeId> =
             view.prominent.iter().copied().filter(|&root| self.look_at(solution, root, &from, seen)).collect();
-        self.look_around(solution, &from, &looked_at, seen);
+        let met = self.look_around(solution, &from, &looked_at, seen);
         merge(seen, first);
+        balance(&mut seen[first..], met);
     }
 
     /// Looks at one patch, unless it sends next to nothing to the point. Returns whether it was looked at.
@@ -207,11 +211,18 @@ impl RayGather {
         }
     }
 
-    /// Adds what rays over the hemisphere meet of patches that are not looked at.
-    fn look_around(&self, solution: &Solution, from: &Origin<'_>, looked_at: &[NodeId], seen: &mut Vec<SeenNode>) {
+    /// Adds what rays over the hemisphere meet of patches that are not looked at. Returns the part of all that meets any front.
+    fn look_around(
+        &self,
+        solution: &Solution,
+        from: &Origin<'_>,
+        looked_at: &[NodeId],
+        seen: &mut Vec<SeenNode>,
+    ) -> f64 {
         let elements = &solution.elements;
         let rays = from.view.rays;
         let share = 1.0 / f64::from(rays);
+        let mut met_any = 0;
         let Viewpoint { position, up, normal, .. } = from.point;
         // About a shading normal some look below the polygon's plane, where nothing is seen.
         for direction in hemisphere(normal, rays, from.shift).filter(|way| normal == up || up.dot(*way) > 0.0) {
@@ -226,6 +237,7 @@ impl RayGather {
             if hit.normal.dot(direction) >= 0.0 {
                 continue; // A back, which is black.
             }
+            met_any += 1;
             let frame = &elements.patches[self.patches[hit.id as usize] as usize];
             if looked_at.binary_search(&frame.root).is_ok() {
                 continue;
@@ -235,6 +247,7 @@ impl RayGather {
             let offset = frame.along(place - elements.nodes[node as usize].centre);
             seen.push(SeenNode { node, form_factor: share, offset });
         }
+        f64::from(met_any) * share
     }
 
     /// Whether a polygon is the one that rays start from, or its other side.
@@ -281,6 +294,16 @@ fn scatter_of(rays: u32) -> f64 {
     SCATTER * f64::from(rays).powf(-0.75)
 }
 
+/// Scales what is seen to the part of all rays that met something, and to no more than all there is: by rays alone white walls that
+/// see each other would now and then send back more than they got, and never come to rest.
+fn balance(seen: &mut [SeenNode], met: f64) {
+    let sum: f64 = seen.iter().map(|seen| seen.form_factor).sum();
+    if sum > 0.0 {
+        let scale = (met / sum).clamp(1.0 / MOST_BALANCED, MOST_BALANCED).min(1.0 / sum);
+        seen.iter_mut().for_each(|seen| seen.form_factor *= scale);
+    }
+}
+
 /// Makes one of all that is seen of each node from `first` on.
 fn merge(seen: &mut Vec<SeenNode>, first: usize) {
     seen[first..].sort_by_key(|seen| seen.node);
@@ -319,6 +342,24 @@ mod tests {
         let mut none = Vec::new();
         merge(&mut none, 0);
         assert!(none.is_empty());
+    }
+
+    #[test]
+    fn what_is_seen_is_what_rays_met_and_no_more_than_all() {
+        let seen = |form_factor| SeenNode { node: 0, form_factor, offset: DVec2::ZERO };
+        let balanced = |form_factors: [f64; 2], met: f64| {
+            let mut seen = form_factors.map(seen);
+            balance(&mut seen, met);
+            seen.map(|seen| seen.form_factor)
+        };
+        assert_eq!(balanced([0.0, 0.0], 1.0), [0.0, 0.0]);
+        assert_eq!(balanced([0.25, 0.25], 0.5), [0.25, 0.25]);
+        assert!((balanced([0.5, 0.625], 1.0).iter().sum::<f64>() - 1.0).abs() < 1e-15);
+        assert!((balanced([0.6, 0.3], 1.0).iter().sum::<f64>() - 1.0).abs() < 1e-15);
+        // Little is met, or much more is seen than there is.
+        assert_eq!(balanced([0.25, 0.25], 0.0), [0.2, 0.2]);
+        assert!((balanced([2.0, 1.0], 1.0).iter().sum::<f64>() - 1.0).abs() < 1e-15);
+        balance(&mut [], 1.0);
     }
 
     /// In a closed, furnished room what is seen adds up to the hemisphere, whether it is looked at or met.
