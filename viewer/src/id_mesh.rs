@@ -113,7 +113,7 @@ mod tests {
         let unshared = mesh.unshared();
         is_the_mesh_of(&unshared, &baked);
         assert_eq!(unshared.vertices.len(), 3 * baked.triangles.len());
-        let is_own = |(i, vertex): (u32, &IdVertex)| vertex.triangle == i / 3 | (i / 3 % 2 * SHEET);
+        let is_own = |(i, vertex): (u32, &IdVertex)| vertex.triangle == (i / 3) | (i / 3 % 2 * SHEET);
         assert!((0..).zip(&unshared.vertices).all(is_own));
     }
 }
