@@ -9,7 +9,7 @@ use std::f64::consts::{PI, TAU};
 use std::ops::Range;
 
 use glam::DVec3;
-use scene::{Environment, Rgb, Sky, luminance, texel_solid_angle};
+use scene::{Environment, Rgb, SUN_RADIUS, Sky, luminance, texel_solid_angle};
 use serde::{Deserialize, Serialize};
 
 use crate::form_factor::form_vector;
@@ -28,9 +28,6 @@ const MOST_LEVEL: u32 = 8;
 
 /// Rows that a sky by the standard is looked at in.
 const ROWS: u32 = 256;
-
-/// Angular radius of the sun, radians: half of 0.533°.
-const SUN_RADIUS: f64 = 0.533 / 2.0 / 180.0 * PI;
 
 /// Corners of the sun.
 const SUN_CORNERS: u32 = 16;

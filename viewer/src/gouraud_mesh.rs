@@ -2,7 +2,7 @@
 
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
-use scene::Baked;
+use scene::{Baked, other_sides};
 
 /// A corner and its light.
 #[repr(C)]
@@ -12,6 +12,8 @@ pub(crate) struct GouraudVertex {
     pub position: [f32; 3],
     /// W·sr⁻¹·m⁻².
     pub radiance: [f32; 3],
+    /// 1 on a polygon whose back is the other side of the same surface, else 0.
+    pub is_sheet: f32,
 }
 
 /// The vertices, and three of them by triangle, in the order of the bake.
@@ -25,6 +27,7 @@ impl GouraudMesh {
     /// The mesh of a bake that validates; a texture counts with its mean.
     pub fn of(baked: &Baked) -> Self {
         let mut mesh = Self::default();
+        let other_sides = other_sides(&baked.scene);
         // By sample, the last vertex with its light, and the corner and polygon that it is of.
         let mut known = vec![None; baked.samples.len()];
         for (id, triangle) in (0..).zip(&baked.triangles) {
@@ -36,7 +39,8 @@ impl GouraudMesh {
                         let (s, t) = scene::SAMPLE_BARYCENTRICS[2 * i];
                         let position = baked.vertices[corner as usize].to_array();
                         let radiance = baked.radiance(id, s, t).as_vec3().max(Vec3::ZERO).to_array();
-                        mesh.vertices.push(GouraudVertex { position, radiance });
+                        let is_sheet = f32::from(u8::from(other_sides[triangle.polygon as usize].is_some()));
+                        mesh.vertices.push(GouraudVertex { position, radiance, is_sheet });
                         let vertex = mesh.vertices.len() as u32 - 1;
                         known[sample] = Some((vertex, (corner, triangle.polygon)));
                         vertex

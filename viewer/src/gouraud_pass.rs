@@ -13,7 +13,7 @@ pub(crate) fn gouraud_pass(device: &wgpu::Device, output: wgpu::TextureFormat) -
     let vertices = wgpu::VertexBufferLayout {
         array_stride: size_of::<GouraudVertex>() as u64,
         step_mode: wgpu::VertexStepMode::Vertex,
-        attributes: &wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3],
+        attributes: &wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3, 2 => Float32],
     };
     MeshPass::new(device, "gouraud", SHADER, vertices, output)
 }
