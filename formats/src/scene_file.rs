@@ -18,7 +18,8 @@
 //! specular = 0.2              # of highlights or of a mirror, for pictures along rays; a bake knows the reflectance alone
 //! exponent = 50               # of highlights (the larger, the smaller they are)
 //! mirror = false
-//! two_sided = false           # whether the backs of its faces are there, too, whatever its model or --two-sided says
+//! two_sided = false           # whether the backs of its faces are there, too, whatever its model or --two-sided says; of closed
+//!                             # solids nobody sees them, and they are not
 //!
 //! [[camera]]                  # the first is the one that pictures are taken with
 //! name = "door"

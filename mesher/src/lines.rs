@@ -195,4 +195,29 @@ mod tests {
         assert_eq!(lines.all().len(), known);
         assert!(parts.iter().all(|(part, _)| lines.on(&solution, 0, *part).eq(lines.on(&solution, 0, leaf))));
     }
+
+    /// A plate under the sun casts lines where the rim of its disc passes the plate's border, and no others.
+    #[test]
+    fn a_sun_casts_lines() {
+        let sky = scene::CieSky::new(5, [0.0, std::f64::consts::FRAC_PI_2], 100.0).expect("a sun at the zenith");
+        let environment =
+            scene::Environment { sky: scene::Sky::Cie(sky), up: scene::UpAxis::Z, rotation: 0.0, scale: 1.0 };
+        let outlines = [square(0.0, 0.0, 0.0, 2.0), square(0.3, 0.2, 1.0, 0.4)];
+        let scene = Scene { environment: Some(environment), ..scene_of(&outlines) };
+        let solution = solve(&scene, &SolveOptions::default(), &|_| ());
+        let gather = Gather::with_source_error(&scene, &solution, 1e-3);
+        let mut lines = Lines::of_links(&scene, &solution, Weight::Change, None);
+        let mut leaves: Vec<(NodeId, Shafts)> =
+            solution.leaves_of(0).into_iter().map(|leaf| (leaf, Shafts::default())).collect();
+        lines.search(&scene, (&solution, &gather), &mut leaves, Weight::Change, |_| 0.0);
+        // How far outside of the plate's picture on the floor a place is.
+        let outside = |place: DVec3| ((place.x - 0.3).abs().max((place.y - 0.2).abs())) - 0.4;
+        let penumbra = 1.01 * scene::SUN_RADIUS;
+        let ends = || lines.all().iter().flat_map(|line| line.ends);
+        assert!(lines.all().len() > 8 && lines.all().iter().all(|line| line.source as usize >= scene.polygons.len()));
+        assert!(ends().all(|end| outside(end).abs() < penumbra));
+        for half in [-penumbra..0.0, 0.0..penumbra] {
+            assert!(ends().any(|end| half.contains(&outside(end))), "both borders of the penumbra");
+        }
+    }
 }

@@ -355,3 +355,16 @@ pub(crate) fn offset(solution: &Solution, element: NodeId, position: DVec3) -> D
     let Some(patch) = elements.patch_of(element) else { return DVec2::ZERO };
     elements.patches[patch as usize].along(position - elements.nodes[element as usize].centre)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_largest_moves_may_be_passed_over() {
+        assert_eq!(largest_move(&[], &[], 0), 0.0);
+        let (from, to) = ([Rgb::ZERO; 4], [Rgb::X, Rgb::Y * -3.0, Rgb::Z * 2.0, Rgb::ZERO]);
+        let moves: Vec<f64> = (0..4).map(|passed_over| largest_move(&from, &to, passed_over)).collect();
+        assert_eq!(moves, [3.0, 2.0, 1.0, 0.0]);
+    }
+}

@@ -74,7 +74,7 @@ pub struct Gather<'a> {
     /// Prepared when a point asks for reflectors first, in a scene where rays find them.
     rays: OnceLock<RayGather>,
     /// Rays from a point, and their turn.
-    sampling: (u32, u32),
+    pub(crate) sampling: (u32, u32),
     opening: Opening,
     /// Mean luminance of the radiosity that each polygon reflects, W·m⁻².
     radiosity: Vec<f64>,
@@ -146,11 +146,6 @@ impl<'a> Gather<'a> {
     /// The emitters, in a scene without links.
     pub(crate) fn emitter_tree(&self) -> Option<&LightTree> {
         self.emitter_tree.as_ref()
-    }
-
-    /// Rays from a point to the sky, where they tell what is seen of it, and their turn.
-    pub(crate) fn sampling(&self) -> (u32, u32) {
-        self.sampling
     }
 
     /// Rays over the solution's elements, where they stand in for links.

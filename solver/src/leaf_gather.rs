@@ -32,7 +32,7 @@ const CURVATURE: f64 = 2.0;
 
 /// Obstacles before a source at most that are projected one by one, in a scene of too many polygons for links; past more,
 /// rays tell what is seen of it. Less leaves penumbrae to rays that exact ones would be had for.
-pub(crate) const MOST_OBSTACLES: usize = 24;
+const MOST_OBSTACLES: usize = 24;
 
 /// Six points that integrate a polynomial of degree 4 over a triangle: weights, and barycentrics of which the second counts
 /// twice (Dunavant, "High Degree Efficient Symmetrical Gaussian Quadrature Rules for the Triangle", 1985). A point a

@@ -4,7 +4,7 @@
 //! boxes, and for each with a surface in it is found out which cells of the sky are seen from there. Points then send their rays
 //! to these alone, most to those that are seen from some places and from others not.
 
-use std::f64::consts::TAU;
+use std::f64::consts::PI;
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -162,7 +162,7 @@ fn neighbours(sky: &SkyCells, leaves: &[u32]) -> Vec<Vec<u32>> {
             (middle, corners.iter().map(|corner| middle.dot(*corner).clamp(-1.0, 1.0).acos()).fold(0.0, f64::max))
         })
         .collect();
-    let touch = |(a, wide): (DVec3, f64), (b, other): (DVec3, f64)| a.dot(b) > (wide + other).min(TAU / 2.0).cos();
+    let touch = |(a, wide): (DVec3, f64), (b, other): (DVec3, f64)| a.dot(b) > (wide + other).min(PI).cos();
     let of =
         |&cone: &(DVec3, f64)| (0..).zip(&cones).filter(|(_, other)| touch(cone, **other)).map(|(i, _)| i).collect();
     cones.par_iter().map(of).collect()
@@ -179,4 +179,63 @@ fn beside(key: BoxKey) -> Vec<BoxKey> {
         }
     }
     all
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use scene::{Environment, LatLongMap, Sky, UpAxis};
+
+    use super::*;
+    use crate::cut::cut_polygon;
+    use crate::testing::Builder;
+
+    /// A room with one wall open, under an even sky.
+    fn open_room() -> (Scene, Elements, SkyCells) {
+        let walls = [true, false, true, true, true, true];
+        let room = Builder::default().material(0.5, 0.0).sides(DVec3::ZERO, DVec3::new(4.0, 3.0, 2.5), true, walls);
+        let map = LatLongMap { width: 1, height: 1, texels: vec![glam::Vec3::ONE] };
+        let sky = Environment { sky: Sky::Map(map), up: UpAxis::Z, rotation: 0.0, scale: 1.0 };
+        let scene = Scene { environment: Some(sky), ..room.build() };
+        let pieces: Vec<_> = scene.polygon_ids().map(|polygon| cut_polygon(&scene.outline(polygon), &[])).collect();
+        let mut elements = Elements::new(&pieces);
+        elements.divide_larger(0.1); // So that each box on a wall holds one.
+        let cells = SkyCells::new(scene.environment.as_ref());
+        (scene, elements, cells)
+    }
+
+    #[test]
+    fn nothing_is_known_where_nothing_is() {
+        let (scene, elements, cells) = open_room();
+        let openings = Openings::new(&scene, &PolygonTree::new(&scene), &elements, &cells);
+        assert_eq!(openings.from(DVec3::new(2.0, 1.5, 1.2)), None, "in the middle of the room there is no surface");
+        assert_eq!(Openings::default().from(DVec3::ZERO), None);
+        let empty = Scene { environment: scene.environment, ..Scene::default() };
+        let openings = Openings::new(&empty, &PolygonTree::new(&empty), &Elements::new(&[]), &cells);
+        assert_eq!(openings.from(DVec3::ZERO), None);
+    }
+
+    /// From the back of the room the cells are known that are seen through its open side, and few others.
+    #[test]
+    fn what_is_seen_through_the_open_side_is_known() {
+        let (scene, elements, cells) = open_room();
+        let tree = PolygonTree::new(&scene);
+        let openings = Openings::new(&scene, &tree, &elements, &cells);
+        let wall = 0; // At x = 0, across from the open side.
+        let leaves = (0..cells.cells.len() as u32).filter(|&cell| cells.cells[cell as usize].parts.is_empty());
+        let leaves: Vec<u32> = leaves.collect();
+        let mut known = 0;
+        for i in 0..60 {
+            let place = DVec3::new(0.0, 0.05 + 0.0483 * f64::from(i), 0.1 + f64::from(i * 7 % 24) * 0.1);
+            let seen = openings.from(place).unwrap();
+            for &cell in &leaves {
+                let middle: DVec3 = cells.cells[cell as usize].corners.iter().sum();
+                let is_free = middle.x > 0.0 && !tree.is_blocked(wall, place, place + middle * 100.0, |_| false);
+                let is_known = seen.binary_search_by_key(&cell, |seen| seen.cell).is_ok();
+                assert!(is_known || !is_free, "{cell} is seen from {place}");
+                known += u32::from(is_known);
+            }
+        }
+        assert!(known < 60 * leaves.len() as u32 / 2, "{known} of {}", 60 * leaves.len());
+    }
 }

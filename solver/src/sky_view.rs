@@ -280,7 +280,7 @@ impl LeafGather<'_> {
         if sum <= 0.0 {
             return Rgb::ZERO;
         }
-        let (rays, turn) = gather.sampling();
+        let (rays, turn) = gather.sampling;
         let rays = if self.sky.is_short { rays.div_ceil(SHORT_PART) } else { rays };
         let origin = from.aside(ASIDE * gather.geometry.size);
         let first = shift(from.position, turn);

@@ -173,3 +173,38 @@ fn behind_too_many_obstacles_rays_tell() {
     let rms = (offs.iter().map(|off| off * off).sum::<f64>() / 40.0).sqrt();
     assert!(mean.abs() < 0.01 && rms < 0.04, "{mean} {rms}");
 }
+
+/// Short patches in a room send their rays to what is seen through its window from about there.
+#[test]
+fn through_openings_short_patches_see_the_window() {
+    let window = [(1.0, 1.0), (1.0, 2.0), (2.2, 2.0), (2.2, 1.0)].map(|(y, z)| DVec3::new(4.0, y, z));
+    let frame = |y: [f64; 2], z: [f64; 2]| {
+        [(y[0], z[0]), (y[0], z[1]), (y[1], z[1]), (y[1], z[0])].map(|(y, z)| DVec3::new(4.0, y, z))
+    };
+    let walls = [true, false, true, true, true, true];
+    let mut builder = Builder::default()
+        .material(0.0, 0.0)
+        .sides(DVec3::ZERO, DVec3::new(4.0, 3.0, 2.5), true, walls)
+        .polygon(&frame([0.0, 3.0], [0.0, 1.0]))
+        .polygon(&frame([0.0, 3.0], [2.0, 2.5]))
+        .polygon(&frame([0.0, 1.0], [1.0, 2.0]))
+        .polygon(&frame([2.2, 3.0], [1.0, 2.0]));
+    for i in 0..80 {
+        let (x, y) = (1.0 + 0.2 * f64::from(i % 10), 0.8 + 0.2 * f64::from(i / 10));
+        let tile = [(0.0, 0.0), (0.03, 0.0), (0.03, 0.03), (0.0, 0.03)];
+        builder = builder.polygon(&tile.map(|(u, v)| DVec3::new(x + u, y + v, 0.2)));
+    }
+    let (scene, mut solution) = lit(builder, uniform());
+    let tree = PolygonTree::new(&scene);
+    solution.openings = Some(crate::Openings::new(&scene, &tree, &solution.elements, &solution.sky));
+    let gather = Gather::new(&scene, &solution);
+    let off = |tile: u32| {
+        let place = scene::centroid(&scene.outline(tile));
+        let expected = PI * form_factor_at(place, DVec3::Z, &window);
+        gather.irradiance_at(tile, place, DVec3::ZERO).x / expected - 1.0
+    };
+    let offs: Vec<f64> = scene.polygon_ids().skip(9).map(off).collect();
+    let mean = offs.iter().sum::<f64>() / 80.0;
+    let rms = (offs.iter().map(|off| off * off).sum::<f64>() / 80.0).sqrt();
+    assert!(offs.len() == 80 && mean.abs() < 0.02 && rms < 0.15, "{mean} {rms}");
+}
