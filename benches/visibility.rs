@@ -13,7 +13,7 @@ mod generated;
 use std::path::PathBuf;
 
 use glam::{DVec3, Vec3};
-use renderer::{EnvironmentLights, Eye, SkyPicture, SkySampling, Visibility, sky_picture};
+use renderer::{EnvironmentLights, Eye, SkyIllumination, SkyPicture, SkySampling, Visibility, sky_picture};
 use scene::{Bvh, Camera, CieSky, Environment, NamedCamera, Polygon, Scene, Sky, UpAxis};
 
 /// The paper's side of a picture, pixels.
@@ -61,7 +61,7 @@ fn rows(scene: &Scene, environment: &Environment, count: u32) {
     let eye = Eye::new(scene, &bvh, scene.cameras[0].camera, SIDE, SIDE);
     let made = |name: &str| {
         let (_, visibility) = Visibility::NAMED.into_iter().find(|(known, _)| *known == name).unwrap();
-        sky_picture(&eye, environment, &lights, visibility, true)
+        sky_picture(&eye, SkyIllumination::direct(environment, &lights), visibility, true)
     };
     let whole = |picture: &SkyPicture| picture.seconds.primary + picture.seconds.visibility + picture.seconds.shading;
     let truth = made("full");

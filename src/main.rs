@@ -5,6 +5,7 @@
 mod args;
 mod artist;
 mod bake;
+mod baked_points;
 mod compare;
 mod environment;
 mod error_map;

@@ -12,6 +12,7 @@ use scene::{Baked, Bvh, Camera, DiscontinuityLine, Provenance, Rgb, Scene};
 use solver::{Gather, Solution};
 
 use crate::args::{LightFlags, RadianceChoice, RadianceFlags, RenderFlags};
+use crate::baked_points::BakedPoints;
 use crate::failure::Usage;
 use crate::input::{Input, require_light};
 use crate::light_sources::LightSources;
@@ -24,10 +25,6 @@ use crate::shot::camera;
 /// Paths for one sample where nothing else is said: about as many as take the time of the rest of a sample's work ten times, so
 /// that this is not what is waited for.
 const PATHS: u32 = 16;
-
-/// How far a point of a surface may lie from the triangle of the mesh that stands for it, as a fraction of the scene's size: the
-/// mesh has positions in f32.
-const REACH: f64 = 1e-6;
 
 /// Refuses flags that say nothing of the radiance that was chosen.
 pub fn check(flags: &RadianceFlags) -> Result<()> {
@@ -145,10 +142,9 @@ pub fn with_evaluator_of<T>(
 }
 
 fn by_interpolants<T>(baked: &Baked, view: &View, work: impl FnOnce(&Evaluator<'_>) -> T) -> T {
-    let (mesh, reach) = (baked.bvh(), REACH * baked.scene.size());
+    let points = BakedPoints::new(baked);
     let irradiance = |point: &SurfacePoint| {
-        let found = baked.locate(&mesh, point.position, point.normal, reach);
-        found.map_or(Rgb::ZERO, |(triangle, s, t)| baked.irradiance(triangle, s, t))
+        points.locate(point).map_or(Rgb::ZERO, |(triangle, s, t)| baked.irradiance(triangle, s, t))
     };
     let bvh = Bvh::of_scene(&baked.scene);
     let eye = view.eye(&baked.scene, &bvh);

@@ -2,11 +2,14 @@
 
 use anyhow::{Context, Result, bail};
 use glam::Vec3;
-use renderer::{Coherence, EnvironmentLights, Eye, SkyPicture, SkySeconds, Visibility, sky_picture};
-use scene::{Bvh, Display, Exposure, luminance};
+use renderer::{
+    Coherence, EnvironmentLights, Eye, SkyIllumination, SkyPicture, SkySeconds, SurfacePoint, Visibility, sky_picture,
+};
+use scene::{Baked, Bvh, Display, Environment, Exposure, Rgb, Sky, luminance};
 use serde::Serialize;
 
 use crate::args::{ExposureChoice, ImageKind, RenderFlags, SceneFlags, SkyFlags, SkySource};
+use crate::baked_points::BakedPoints;
 use crate::environment::environment;
 use crate::failure::{Outcome, Usage};
 use crate::input::Input;
@@ -34,13 +37,21 @@ pub fn run(flags: &RenderFlags, source: &SkySource, outputs: &Outputs) -> Result
     let output = outputs.claim(&flags.output)?;
     let claim = |path: &Option<std::path::PathBuf>| path.as_deref().map(|path| outputs.claim(path)).transpose();
     let (ray_map, cells) = (claim(&sky.ray_map)?, claim(&sky.sky_picture)?);
-    // The environment is the picture's: a bake has nothing to do with it.
+    // The environment is the picture's: that of a scene or a bake stays as it is.
     let reading = SceneFlags { two_sided: flags.reading.two_sided, ..SceneFlags::default() };
-    let scene = match Input::read(&flags.input, &reading)? {
-        Input::Scene(scene) => scene,
-        Input::Baked(baked) => baked.scene,
+    let input = Input::read(&flags.input, &reading)?;
+    let (scene, bounce) = match &input {
+        Input::Scene(scene) => (scene, None),
+        Input::Baked(baked) => {
+            warn_of_another_sky(flags, baked, &environment);
+            (&baked.scene, Some((baked, BakedPoints::new(baked))))
+        }
     };
-    let camera = camera(&viewpoint, &scene)?;
+    let elsewhere = |point: &SurfacePoint| {
+        let found = bounce.as_ref().and_then(|(baked, points)| Some((baked, points.locate(point)?)));
+        found.map_or(Rgb::ZERO, |(baked, (triangle, s, t))| baked.irradiance_from_surfaces(triangle, s, t))
+    };
+    let camera = camera(&viewpoint, scene)?;
     let stage = Stage::start("lights");
     let lights = EnvironmentLights::new(&environment, sky.lights, sky.sky_sampling.into());
     let lights = lights.with_context(|| format!("{source}: the sky is black; give one with light in it"))?;
@@ -51,15 +62,16 @@ pub fn run(flags: &RenderFlags, source: &SkySource, outputs: &Outputs) -> Result
             "warning: --lights {asked}: only {found} places of the sky have light, so there are {found} lights"
         ));
     }
-    let bvh = Bvh::of_scene(&scene);
+    let bvh = Bvh::of_scene(scene);
     let (width, height) = flags.size;
-    let eye = Eye::new(&scene, &bvh, camera, width, height);
+    let eye = Eye::new(scene, &bvh, camera, width, height);
     let stage = Stage::start("render");
-    let picture = sky_picture(&eye, &environment, &lights, visibility, sky.check);
+    let light = SkyIllumination { environment: &environment, lights: &lights, elsewhere: &elsewhere };
+    let picture = sky_picture(&eye, light, visibility, sky.check);
     stage.end();
     let wrong = sky.check.then(|| {
         let stage = Stage::start("check");
-        let truth = sky_picture(&eye, &environment, &lights, Visibility::Full, true);
+        let truth = sky_picture(&eye, light, Visibility::Full, true);
         stage.end();
         wrong_by_pixel(&picture, &truth)
     });
@@ -82,6 +94,24 @@ pub fn run(flags: &RenderFlags, source: &SkySource, outputs: &Outputs) -> Result
         write(&cells, (width, height), &sky, display)?;
     }
     report(&picture, flags, lights.count(), wrong.as_deref(), exposure)
+}
+
+/// Says so where what a bake's surfaces reflect is not the light of the picture's sky.
+fn warn_of_another_sky(flags: &RenderFlags, baked: &Baked, environment: &Environment) {
+    let baked_under = baked.scene.environment.as_ref();
+    let kept = match &environment.sky {
+        // A bake keeps a map in few texels.
+        Sky::Map(map) => Environment { sky: Sky::Map(map.clone().bounded()), ..*environment },
+        Sky::Cie(_) => environment.clone(),
+    };
+    if baked_under != Some(&kept) {
+        let sky = if baked_under.is_some() { "another sky" } else { "no sky" };
+        say(format_args!(
+            "warning: {} was baked under {sky}: what its surfaces reflect is not the light of this one; bake it with the same \
+             --environment",
+            flags.input.display()
+        ));
+    }
 }
 
 /// The way that flags describe by which it is found what is seen.

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use glam::{DVec3, Vec3};
-use renderer::{Coherence, EnvironmentLights, Eye, SkyPicture, SkySampling, Visibility, sky_picture};
+use renderer::{Coherence, EnvironmentLights, Eye, SkyIllumination, SkyPicture, SkySampling, Visibility, sky_picture};
 use scene::{Bvh, Display, Environment, Exposure, LatLongMap, Scene, Sky, ToneCurve, UpAxis, encode_srgb};
 use serde_json::Value;
 
@@ -156,7 +156,7 @@ fn the_same_bytes_at_any_number_of_threads() {
         pool.install(|| {
             let lights = EnvironmentLights::new(&environment, 60, SkySampling::Structured).unwrap();
             let eye = Eye::new(&scene, &bvh, scene.cameras[0].camera, 150, 131);
-            let made = sky_picture(&eye, &environment, &lights, visibility, true);
+            let made = sky_picture(&eye, SkyIllumination::direct(&environment, &lights), visibility, true);
             (made.radiance, made.traced, made.seen, made.rays, made.pairs)
         })
     };
@@ -178,7 +178,7 @@ fn predictions_are_seldom_wrong() {
         let (bvh, environment) = (Bvh::of_scene(&scene), cie(12));
         let lights = EnvironmentLights::new(&environment, 64, SkySampling::Structured).unwrap();
         let eye = Eye::new(&scene, &bvh, scene.cameras[0].camera, 181, 181);
-        let made = |name: &str| sky_picture(&eye, &environment, &lights, named(name), true);
+        let made = |name: &str| sky_picture(&eye, SkyIllumination::direct(&environment, &lights), named(name), true);
         let truth = made("full");
         for name in ["gwb", "gnb", "gwu", "gnu", "gnu-restricted", "gnu-unflooded", "opt", "gnu-borders", "opt-borders"]
         {
@@ -199,10 +199,12 @@ fn rays_go_where_they_are_wanted() {
     let lights = EnvironmentLights::new(&environment, 100, SkySampling::Structured).unwrap();
     let eye = Eye::new(&scene, &bvh, scene.cameras[0].camera, 129, 129);
     let Visibility::Coherent(opt) = named("opt") else { unreachable!("it predicts") };
-    let made = |coherence| sky_picture(&eye, &environment, &lights, Visibility::Coherent(coherence), true);
+    let made = |coherence| {
+        sky_picture(&eye, SkyIllumination::direct(&environment, &lights), Visibility::Coherent(coherence), true)
+    };
     let (plain, bright) = (made(opt), made(Coherence { brightest: 16, ..opt }));
     assert!(bright.rays > plain.rays);
-    let truth = sky_picture(&eye, &environment, &lights, Visibility::Full, true);
+    let truth = sky_picture(&eye, SkyIllumination::direct(&environment, &lights), Visibility::Full, true);
     let off = |picture: &SkyPicture| {
         let pairs = picture.radiance.iter().zip(&truth.radiance);
         pairs.map(|(a, b)| f64::from((*a - *b).abs().element_sum())).sum::<f64>()
@@ -229,8 +231,9 @@ fn a_sky_that_turns_does_not_flicker() {
         environment.rotation = f64::from(frame) / f64::from(frames) * std::f64::consts::TAU;
         let lights = EnvironmentLights::new(&environment, 200, SkySampling::Structured).unwrap();
         let eye = Eye::new(&scene, &bvh, scene.cameras[0].camera, 129, 129);
-        let [made, truth] =
-            ["gnu", "full"].map(|name| shown(&sky_picture(&eye, &environment, &lights, named(name), false).radiance));
+        let [made, truth] = ["gnu", "full"].map(|name| {
+            shown(&sky_picture(&eye, SkyIllumination::direct(&environment, &lights), named(name), false).radiance)
+        });
         let off = made.iter().zip(&truth).filter(|(a, b)| a.iter().zip(*b).any(|(a, b)| a.abs_diff(*b) > 2)).count();
         assert!(off * 1000 <= made.len(), "frame {frame}: {off} of {} pixels", made.len());
     }
@@ -290,7 +293,7 @@ fn full_tracing_is_what_rays_say() {
     let (bvh, environment) = (Bvh::of_scene(&scene), cie(5));
     let lights = EnvironmentLights::new(&environment, 70, SkySampling::EqualLight).unwrap();
     let eye = Eye::new(&scene, &bvh, scene.cameras[0].camera, 40, 30);
-    let made = sky_picture(&eye, &environment, &lights, Visibility::Full, true);
+    let made = sky_picture(&eye, SkyIllumination::direct(&environment, &lights), Visibility::Full, true);
     let mut pairs = 0;
     for (pixel, seen) in made.seen.chunks(2).enumerate() {
         let place = glam::DVec2::new((pixel % 40) as f64 + 0.5, (pixel / 40) as f64 + 0.5);

@@ -60,6 +60,16 @@ fn a_scene_with_links_ends_the_same_when_resumed() {
     }
 }
 
+/// Of light from the sky, what comes straight from there is told apart.
+#[test]
+fn a_scene_under_a_sky_ends_the_same_when_resumed() {
+    let path = data("scenes/window.obj");
+    let sky = scene::Sky::Cie(scene::CieSky::new(12, [1.5, 0.5], 0.0).unwrap());
+    let environment = scene::Environment { sky, up: scene::UpAxis::Z, rotation: 0.0, scale: 1.0 };
+    let scene = Scene { environment: Some(environment), ..formats::read_scene(&path).unwrap().scene };
+    ends_the_same_when_resumed(&scene, 0.1, 2);
+}
+
 #[test]
 fn a_scene_without_links_ends_the_same_when_resumed() {
     let scene = hall(500);

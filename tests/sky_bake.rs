@@ -68,4 +68,39 @@ fn a_room_with_a_window_holds() {
     let (scene, bake) = (room_with_a_window(folder.path()), folder.path().join("room.hlf"));
     run(&["bake", text(&scene), "-o", text(&bake), "--environment", "cie:12", "--tolerance", "0.03"]);
     run(&["verify", text(&bake)]);
+
+    // A picture by lights that stand for the sky has the bake's reflected light besides.
+    let mean = |input: &Path, flags: &[&str]| {
+        let picture = folder.path().join("picture.exr");
+        let view = ["--eye", "2,2.8,1.3", "--target", "2,0,1.0", "--fov", "70", "--size", "48x36"];
+        let said = run(&[&["render", text(input), "-o", text(&picture)], &view[..], flags].concat());
+        // The floor alone: the window's edges are pixels wide.
+        let pixels = formats::read_exr(&picture).unwrap().2.split_off(48 * 28);
+        let sum = pixels.iter().map(|pixel| pixel.as_dvec3()).sum::<DVec3>();
+        (sum / pixels.len() as f64, String::from_utf8(said.stderr).unwrap())
+    };
+    let sky = ["--environment", "cie:12", "--lights", "1000", "--visibility", "full"];
+    let (whole, said) = mean(&bake, &sky);
+    assert!(!said.contains("warning"), "{said}");
+    let (paths, _) = mean(&bake, &["--radiance", "path", "--paths", "256", "--sampler", "full", "--budget", "1rpp"]);
+    let (direct, _) = mean(&scene, &sky);
+    assert!((whole / paths - DVec3::ONE).abs().max_element() < 0.02, "{whole} in place of {paths}");
+    assert!(direct.max_element() < 0.9 * whole.max_element(), "{direct} of {whole} is direct");
+    let (_, said) = mean(&bake, &["--environment", "cie:1"]);
+    assert!(said.contains("was baked under another sky"), "{said}");
+}
+
+/// Under an open sky a flat floor reflects nothing to itself: a bake adds nothing to its picture.
+#[test]
+fn what_comes_straight_from_the_sky_is_not_counted_twice() {
+    let folder = folder();
+    let (scene, bake) = (floor(folder.path()), folder.path().join("floor.hlf"));
+    run(&["bake", text(&scene), "-o", text(&bake), "--environment", "cie:5", "--tolerance", "0.05"]);
+    let pictures = [&scene, &bake].map(|input| {
+        let picture = folder.path().join("picture.exr");
+        let view = ["--eye", "0,0,1", "--target", "0,0.01,0", "--size", "16x16"];
+        run(&[&["render", text(input), "-o", text(&picture), "--environment", "cie:5"], &view[..]].concat());
+        formats::read_exr(&picture).unwrap().2
+    });
+    assert_eq!(pictures[0], pictures[1]);
 }

@@ -31,7 +31,7 @@ use crate::{FormatError, write_atomically};
 const MAGIC: [u8; 8] = *b"\x89HLF\r\n\x1a\n";
 
 /// Raised with every change that an older program would misread.
-const VERSION: u32 = 5;
+const VERSION: u32 = 6;
 
 /// Bytes before the header.
 const PREAMBLE: usize = 20;
@@ -103,6 +103,7 @@ fn write(path: &Path, baked: &Baked, unfinished: Option<&Unfinished>) -> Result<
         ("environment", to_bytes(map_of(scene.environment.as_ref()))),
         ("vertices", to_bytes(&baked.vertices)),
         ("samples", to_bytes(&baked.samples)),
+        ("sky", to_bytes(&baked.sky)),
         ("triangles", to_bytes(&baked.triangles)),
         ("triangle errors", to_bytes(&baked.triangle_errors)),
         ("elements", to_bytes(&baked.elements)),
@@ -226,6 +227,7 @@ pub fn read_unfinished(path: &Path) -> Result<(Baked, Option<Unfinished>), Forma
         },
         vertices: sections.rows("vertices")?,
         samples: sections.rows("samples")?,
+        sky: sections.rows("sky")?,
         triangles: sections.rows("triangles")?,
         triangle_errors: sections.rows("triangle errors")?,
         elements: sections.rows("elements")?,
@@ -366,6 +368,7 @@ mod tests {
             },
             vertices: corners.map(|corner| corner.as_vec3()).to_vec(),
             samples: (0..6).map(|i| Vec3::splat(i as f32 * 0.1)).collect(),
+            sky: (0..6).map(|i| Vec3::splat(i as f32 * 0.05)).collect(),
             triangles: vec![
                 triangle([0, 1, 2], [EdgeKind::Leaf, EdgeKind::Cut, EdgeKind::Discontinuity(1)]),
                 triangle([0, 2, 3], [EdgeKind::Discontinuity(1), EdgeKind::Interior, EdgeKind::Discontinuity(0)]),
@@ -400,6 +403,7 @@ mod tests {
             answers: Answers {
                 questions: vec![1, u64::MAX, 3],
                 emitted: vec![Rgb::new(1.0, 0.5, 1.0 / 3.0), Rgb::ZERO],
+                sky: vec![Rgb::new(0.5, 0.0, 0.25), Rgb::ZERO],
                 rows: vec![[seen(1), seen(7)].into(), [].into(), [seen(3)].into()],
                 residuals: vec![[0.1, 0.2, 0.3, -0.1, -0.2, -0.3, 7.0]],
             },
@@ -464,6 +468,9 @@ mod tests {
         assert!(matches!(read_interrupted(&interrupted(&bad)).unwrap_err(), FormatError::Invalid { .. }));
         bad = found_out();
         bad.answers.rows[0][1].form_factor = f32::INFINITY;
+        assert!(matches!(read_interrupted(&interrupted(&bad)).unwrap_err(), FormatError::Invalid { .. }));
+        bad = found_out();
+        bad.answers.sky.pop();
         assert!(matches!(read_interrupted(&interrupted(&bad)).unwrap_err(), FormatError::Invalid { .. }));
     }
 

@@ -12,12 +12,13 @@ pub(crate) const UNFINISHED: &str = "unfinished build";
 const OPTIONS: &str = "unfinished options";
 const QUESTIONS: &str = "unfinished questions";
 const EMITTED: &str = "unfinished emitted";
+const SKY: &str = "unfinished sky";
 const ROW_LENGTHS: &str = "unfinished row lengths";
 const ROWS: &str = "unfinished rows";
 const RESIDUALS: &str = "unfinished residuals";
 
 /// Names and bytes of the sections.
-pub(crate) fn sections(unfinished: &Unfinished) -> [(&'static str, Vec<u8>); 7] {
+pub(crate) fn sections(unfinished: &Unfinished) -> [(&'static str, Vec<u8>); 8] {
     let Unfinished { build, options, answers } = unfinished;
     let lengths: Vec<u32> = answers.rows.iter().map(|row| row.len() as u32).collect();
     [
@@ -25,6 +26,7 @@ pub(crate) fn sections(unfinished: &Unfinished) -> [(&'static str, Vec<u8>); 7] 
         (OPTIONS, options.as_bytes().to_vec()),
         (QUESTIONS, to_bytes(&answers.questions)),
         (EMITTED, to_bytes(&answers.emitted)),
+        (SKY, to_bytes(&answers.sky)),
         (ROW_LENGTHS, to_bytes(&lengths)),
         (ROWS, answers.rows.iter().flat_map(|row| to_bytes(row)).collect()),
         (RESIDUALS, to_bytes(&answers.residuals)),
@@ -43,6 +45,7 @@ pub(crate) fn unfinished<'a>(section: impl Fn(&str) -> Option<&'a [u8]>) -> Resu
     let answers = Answers {
         questions: from_bytes(bytes(QUESTIONS)?).ok_or(QUESTIONS)?,
         emitted: from_bytes(bytes(EMITTED)?).ok_or(EMITTED)?,
+        sky: from_bytes(bytes(SKY)?).ok_or(SKY)?,
         rows: rows.filter(|_| rest.is_empty()).ok_or(ROW_LENGTHS)?,
         residuals: from_bytes(bytes(RESIDUALS)?).ok_or(RESIDUALS)?,
     };

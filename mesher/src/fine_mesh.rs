@@ -26,6 +26,7 @@ use crate::{
 const SMALL_PATCH: f64 = 0.01;
 
 /// A mesh of all leaves, and what emitters send to its samples.
+#[derive(Default)]
 pub(crate) struct FineMesh {
     pub leaves: Vec<Leaf>,
     /// The discontinuities that some leaf follows.
@@ -36,6 +37,8 @@ pub(crate) struct FineMesh {
     pub emitted: Vec<Rgb>,
     /// The same by shading normals: what is looked at.
     pub shown: Vec<Rgb>,
+    /// The part of it that is the sky's; empty where there is none.
+    pub shown_sky: Vec<Rgb>,
     /// The same at each triangle's probe point.
     probed: Vec<Rgb>,
 }
@@ -63,7 +66,7 @@ impl FineMesh {
         let mesh = leaf_meshes(&edge_table(scene, &solution.cuts, &leaves));
         let gather = Gather::with_source_error(scene, solution, dim);
         let table = sample_table(scene, &leaves, &mesh, &|polygon, position| gather.contact(polygon, position));
-        let mut fine = Self { leaves, lines, mesh, table, emitted: Vec::new(), shown: Vec::new(), probed: Vec::new() };
+        let mut fine = Self { leaves, lines, mesh, table, ..Self::default() };
         let probes: Vec<SampleQuery> =
             (0..fine.triangles()).map(|triangle| fine.probe_query(triangle).looked_at(scene)).collect();
         let small = SMALL_PATCH * scene.size();
@@ -74,8 +77,14 @@ impl FineMesh {
         known.shafts.retain(|&element, _| solution.elements.is_leaf(element));
         fine.emitted = known.at(solution, &queries, inquiry);
         fine.shown = fine.emitted.clone();
-        for (sample, light) in samples.into_iter().zip(known.at(solution, &shaded, inquiry)) {
+        for (&sample, light) in samples.iter().zip(known.at(solution, &shaded, inquiry)) {
             fine.shown[sample] = light;
+        }
+        if inquiry.has_sky() {
+            fine.shown_sky = known.sky_at(&queries, inquiry);
+            for (&sample, light) in samples.iter().zip(known.sky_at(&shaded, inquiry)) {
+                fine.shown_sky[sample] = light;
+            }
         }
         fine.probed = known.at(solution, &probes, inquiry);
         fine
@@ -160,6 +169,12 @@ impl EmittedLight {
         if inquiry.stopped() {
             return guessed_emitted(solution, queries, &queries.iter().map(known).collect::<Vec<_>>());
         }
+        queries.par_iter().map(|query| known(query).unwrap_or_default()).collect()
+    }
+
+    /// The part that is the sky's, as far as it is known.
+    fn sky_at(&self, queries: &[SampleQuery], inquiry: &Inquiry<'_>) -> Vec<Rgb> {
+        let known = |query: &SampleQuery| self.light.get(&query.key()).map(|&number| inquiry.light_of_sky(number));
         queries.par_iter().map(|query| known(query).unwrap_or_default()).collect()
     }
 }

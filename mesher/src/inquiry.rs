@@ -9,10 +9,10 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use rayon::prelude::*;
 use scene::{Answers, Rgb, Seen};
-use solver::{Solution, Visibility};
+use solver::{DirectIrradiance, Solution, Visibility};
 
 use crate::forecast::{Forecast, Kind};
-use crate::memory::{EMITTED, TYPICAL_ROW, row};
+use crate::memory::{TYPICAL_ROW, emitted, row};
 use crate::residual::ResidualPoint;
 use crate::{Control, SampleQuery};
 
@@ -21,6 +21,8 @@ pub(crate) struct Inquiry<'a> {
     control: Control<'a>,
     forecast: Forecast<'a>,
     answers: Answers,
+    /// Whether the part of the sky is told from that of emitters.
+    has_sky: bool,
     /// How many questions were asked, and how many answers of each kind were given.
     asked: usize,
     emitted: usize,
@@ -45,7 +47,12 @@ enum Stop {
 impl<'a> Inquiry<'a> {
     /// An inquiry that remembers `answers`, of a bake that may hold so many bytes.
     pub fn new(control: Control<'a>, solution: &Solution, answers: Answers, most_bytes: usize) -> Self {
+        let has_sky = !solution.sky.cells.is_empty();
+        // Only a forged file has others.
+        let of_sky = if has_sky { answers.emitted.len() } else { 0 };
+        let answers = if answers.sky.len() == of_sky { answers } else { Answers::default() };
         Self {
+            has_sky,
             control,
             forecast: Forecast::new(control, solution.visibility == Visibility::Rays, solution.reflects()),
             answers,
@@ -88,9 +95,19 @@ impl<'a> Inquiry<'a> {
         (self.stopped == Some(Stop::Interrupted)).then_some(self.answers)
     }
 
-    /// The light of emitters by its number.
+    /// The light of emitters and of the sky by its number.
     pub fn light(&self, number: u32) -> Rgb {
         self.answers.emitted[number as usize]
+    }
+
+    /// Its part from the sky.
+    pub fn light_of_sky(&self, number: u32) -> Rgb {
+        self.answers.sky.get(number as usize).copied().unwrap_or_default()
+    }
+
+    /// Whether there is such a part.
+    pub fn has_sky(&self) -> bool {
+        self.has_sky
     }
 
     /// A row by its number.
@@ -98,20 +115,23 @@ impl<'a> Inquiry<'a> {
         &self.answers.rows[number as usize]
     }
 
-    /// The light of emitters at the first of the queries: all, unless the bake is stopped. `answer` finds it for queries of one
+    /// The light of emitters and of the sky at the first of the queries: all, unless the bake is stopped. `answer` finds it for queries of one
     /// element.
     pub fn emitted(
         &mut self,
         queries: &[&SampleQuery],
-        answer: impl Fn(&[&SampleQuery]) -> Vec<Rgb> + Sync,
+        answer: impl Fn(&[&SampleQuery]) -> Vec<DirectIrradiance> + Sync,
     ) -> Range<u32> {
-        let first = self.emitted;
-        if self.ask((0u8, queries.iter().map(|query| query.key())), queries.len() * EMITTED) {
+        let (first, bytes) = (self.emitted, emitted(self.has_sky));
+        if self.ask((0u8, queries.iter().map(|query| query.key())), queries.len() * bytes) {
             let known = queries.len().min(self.answers.emitted.len() - first);
             let found = self.find(Kind::Emitted, &by_element(&queries[known..]), answer);
-            self.answers.emitted.extend(found);
+            if self.has_sky {
+                self.answers.sky.extend(found.iter().map(|light| light.sky));
+            }
+            self.answers.emitted.extend(found.iter().map(DirectIrradiance::total));
             self.emitted = self.answers.emitted.len().min(first + queries.len());
-            self.given += (self.emitted - first) * EMITTED;
+            self.given += (self.emitted - first) * bytes;
         }
         first as u32..self.emitted as u32
     }
@@ -192,6 +212,7 @@ impl<'a> Inquiry<'a> {
     /// Forgets the answers that have not been given yet.
     fn forget(&mut self) {
         self.answers.emitted.truncate(self.emitted);
+        self.answers.sky.truncate(self.emitted);
         self.answers.rows.truncate(self.rows);
         self.answers.residuals.truncate(self.residuals);
     }

@@ -10,8 +10,10 @@ use crate::{Leaf, LeafSegment, MeshTriangle, SampleQuery};
 /// Bytes of an entry of a map from queries to answers, with the part of the table that is empty on average.
 const ENTRY: usize = size_of::<(QueryKey, u32)>() * 8 / 5;
 
-/// Bytes of an answer about emitters.
-pub(crate) const EMITTED: usize = ENTRY + size_of::<scene::Rgb>();
+/// Bytes of an answer about emitters, of which a part may be the sky's.
+pub(crate) const fn emitted(has_sky: bool) -> usize {
+    ENTRY + size_of::<scene::Rgb>() * if has_sky { 2 } else { 1 }
+}
 
 /// Bytes of a row without what is seen in it, allocation included.
 const ROW: usize = ENTRY + size_of::<Box<[scene::Seen]>>() + 16;

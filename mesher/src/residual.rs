@@ -110,7 +110,7 @@ pub(crate) fn residual(
         let mut seen = Vec::new();
         element.seen_nodes(position, DVec3::ZERO, Cosine::Shading, &mut seen);
         seen.iter_mut().for_each(|seen| seen.offset = DVec2::ZERO);
-        let known = element.emitted(position, DVec3::ZERO, Cosine::Shading) + gather.irradiance_from(&seen);
+        let known = element.emitted(position, DVec3::ZERO, Cosine::Shading).total() + gather.irradiance_from(&seen);
         let seen_nodes: HashSet<NodeId> = seen.iter().map(|seen| seen.node).collect();
         let own = normals[leaf.polygon as usize];
         let normal = scene.shading_normal(leaf.polygon, position).unwrap_or(own);
@@ -152,7 +152,7 @@ fn residual_by_rays(
         let leaf = &fine.leaves[fine.mesh.triangles[triangle].leaf as usize];
         let position = at(fine.corners(triangle), (s, t));
         let emitters = halves[0].over_emitters(leaf.element, &mut Shafts::default());
-        let emitted = emitters.emitted(position, DVec3::ZERO, Cosine::Shading);
+        let emitted = emitters.emitted(position, DVec3::ZERO, Cosine::Shading).total();
         let halves = halves.each_ref().map(|half| {
             let mut seen = Vec::new();
             half.over_reflectors(leaf.element).seen_nodes(position, DVec3::ZERO, Cosine::Shading, &mut seen);

@@ -25,6 +25,7 @@ impl Rounds<'_> {
             vertices,
             triangle_errors: self.triangle_errors(fine, &samples),
             samples,
+            sky: fine.shown_sky.iter().map(|value| value.max(Rgb::ZERO).as_vec3()).collect(),
             triangles,
             elements: fine.leaves.iter().map(element).collect(),
             lines: fine.lines.clone(),

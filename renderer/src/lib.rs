@@ -70,7 +70,7 @@ pub use reference::{Reference, ReferenceOptions, reference};
 pub use reflected_lines::reflected_lines;
 pub use sample_map::{WHITE_SAMPLES, sample_histogram, sample_map};
 pub use scattered::{ScatteredFilm, Surface};
-pub use sky_picture::{SkyPicture, SkySeconds, sky_picture};
+pub use sky_picture::{SkyIllumination, SkyPicture, SkySeconds, sky_picture};
 pub use surface::{SurfacePoint, spread_by_area};
 pub use survey::Rule;
 pub use uniform::UniformSampler;

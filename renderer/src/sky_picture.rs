@@ -1,4 +1,5 @@
-//! Pictures of scenes under a sky: direct light of many lights that are far away, reflected diffusely.
+//! Pictures of scenes under a sky: direct light of many lights that are far away, reflected diffusely, and what a bake knows of
+//! other light.
 //!
 //! A picture is made in blocks of 64 × 64 pixels that know nothing of each other, so that what is kept of visibility fits in a
 //! cache: one bit a light and pixel. A block looks at the first row and column of the next ones too, which costs 3 % of the
@@ -15,6 +16,7 @@ use crate::coherent_visibility::{BlockVisibility, Place, Visibility, block_visib
 use crate::environment_lights::EnvironmentLights;
 use crate::eye::{Eye, SeenPoint, Sight};
 use crate::light_set::{members, words};
+use crate::surface::SurfacePoint;
 
 /// Side of a block, pixels: the paper's. Larger ones look at fewer pixels twice, and keep fewer threads busy.
 const BLOCK: u32 = 64;
@@ -56,12 +58,29 @@ struct Block {
     made: SkyPicture,
 }
 
-/// Makes a picture of what an eye sees under an environment and the lights that stand for it. `keeps_seen` asks for the
+/// What lights a picture.
+#[derive(Clone, Copy)]
+pub struct SkyIllumination<'a> {
+    /// What is seen past all surfaces.
+    pub environment: &'a Environment,
+    /// The lights that stand for it on surfaces.
+    pub lights: &'a EnvironmentLights,
+    /// Irradiance at a point of a surface that the environment does not send straight there, W·m⁻²: of a bake.
+    pub elsewhere: &'a (dyn Fn(&SurfacePoint) -> Rgb + Sync),
+}
+
+impl<'a> SkyIllumination<'a> {
+    /// Light of the environment alone.
+    pub fn direct(environment: &'a Environment, lights: &'a EnvironmentLights) -> Self {
+        Self { environment, lights, elsewhere: &|_| Rgb::ZERO }
+    }
+}
+
+/// Makes a picture of what an eye sees under an environment. `keeps_seen` asks for the
 /// visibility of every light at every pixel, one bit each. The bytes do not depend on the number of threads.
 pub fn sky_picture(
     eye: &Eye<'_>,
-    environment: &Environment,
-    lights: &EnvironmentLights,
+    illumination: SkyIllumination<'_>,
     visibility: Visibility,
     keeps_seen: bool,
 ) -> SkyPicture {
@@ -69,11 +88,11 @@ pub fn sky_picture(
     let across = width.div_ceil(BLOCK);
     let block = |i: u32| {
         let corner = [i % across * BLOCK, i / across * BLOCK];
-        block(eye, (environment, lights), corner, visibility, keeps_seen)
+        block(eye, illumination, corner, visibility, keeps_seen)
     };
     let blocks: Vec<Block> = (0..across * height.div_ceil(BLOCK)).into_par_iter().map(block).collect();
     let pixels = width as usize * height as usize;
-    let words = if keeps_seen { words(lights.directions.len()) } else { 0 };
+    let words = if keeps_seen { words(illumination.lights.directions.len()) } else { 0 };
     let mut picture = SkyPicture {
         radiance: vec![Vec3::ZERO; pixels],
         traced: vec![0; pixels],
@@ -101,7 +120,7 @@ pub fn sky_picture(
 
 fn block(
     eye: &Eye<'_>,
-    (environment, lights): (&Environment, &EnvironmentLights),
+    SkyIllumination { environment, lights, elsewhere }: SkyIllumination<'_>,
     [left, top]: [u32; 2],
     visibility: Visibility,
     keeps_seen: bool,
@@ -146,7 +165,7 @@ fn block(
                     let light = light as usize;
                     lights.irradiance[light] * place.receiver.cosine.dot(lights.directions[light])
                 };
-                let irradiance: Rgb = members(seen).map(light).sum();
+                let irradiance = members(seen).map(light).sum::<Rgb>() + elsewhere(&front.point);
                 reflectance(eye, front) * irradiance / PI + eye.scene().material(front.point.polygon).radiance
             }
         };

@@ -17,6 +17,8 @@ pub struct Baked {
     pub vertices: Vec<Vec3>,
     /// Irradiance samples, W·m⁻², by shading normals where the scene has them ([`Scene::shading_normal`]).
     pub samples: Vec<Vec3>,
+    /// The part of each sample that comes straight from the scene's environment, W·m⁻²; empty where nothing does.
+    pub sky: Vec<Vec3>,
     /// The triangles.
     pub triangles: Vec<BakedTriangle>,
     /// Per triangle, the largest error over its probe points, relative to max(own, mean) irradiance.
@@ -143,6 +145,16 @@ impl Baked {
         self.interpolant(triangle).evaluate(s, t)
     }
 
+    /// The part of the irradiance at (s, t) of a triangle that does not come straight from the scene's environment, W·m⁻²: from
+    /// surfaces that emit, and reflected.
+    pub fn irradiance_from_surfaces(&self, triangle: u32, s: f64, t: f64) -> Rgb {
+        let sky = |sample: u32| self.sky.get(sample as usize).copied().unwrap_or_default();
+        let values = self.triangles[triangle as usize]
+            .samples
+            .map(|sample| self.samples[sample as usize].as_dvec3() - sky(sample).as_dvec3());
+        Interpolant::through(values).evaluate(s, t)
+    }
+
     /// Radiance that leaves a triangle at (s, t): ρE/π + Ke, W·sr⁻¹·m⁻², where ρ is the polygon's: a texture counts with its
     /// mean.
     pub fn radiance(&self, triangle: u32, s: f64, t: f64) -> Rgb {
@@ -175,6 +187,12 @@ impl Baked {
         }
         if let Some(i) = self.samples.iter().position(|sample| !sample.is_finite() || sample.min_element() < 0.0) {
             return number("sample", i);
+        }
+        if !self.sky.is_empty() && self.sky.len() != self.samples.len() {
+            return index("sample from the sky", self.sky.len());
+        }
+        if let Some(i) = self.sky.iter().position(|sample| !sample.is_finite() || sample.min_element() < 0.0) {
+            return number("sample from the sky", i);
         }
         for (i, triangle) in self.triangles.iter().enumerate() {
             let edges =
@@ -233,5 +251,27 @@ impl Baked {
         let hit = bvh.closest_hit(ray, 0.0)?;
         let front = hit.normal.dot(ray.direction) < 0.0;
         Some(if front { self.radiance(hit.id, hit.s, hit.t) } else { Rgb::ZERO })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A triangle with irradiance from the sky, or with what it has in all alone.
+    fn triangle(sky: Vec<Vec3>) -> Baked {
+        let samples = (0..6).map(|i| Vec3::splat(2.0 + i as f32)).collect();
+        let triangles = vec![BakedTriangle { samples: [0, 1, 2, 3, 4, 5], ..BakedTriangle::default() }];
+        Baked { samples, sky, triangles, ..Baked::default() }
+    }
+
+    #[test]
+    fn what_comes_straight_from_the_sky_is_told_apart() {
+        let of_sky = triangle((0..6).map(|i| Vec3::splat(1.0 + i as f32)).collect());
+        for (s, t) in SAMPLE_BARYCENTRICS {
+            assert!((of_sky.irradiance_from_surfaces(0, s, t) - Rgb::ONE).length() < 1e-12);
+            let without = triangle(Vec::new());
+            assert_eq!(without.irradiance_from_surfaces(0, s, t), without.irradiance(0, s, t));
+        }
     }
 }

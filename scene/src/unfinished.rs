@@ -22,8 +22,10 @@ pub struct Unfinished {
 pub struct Answers {
     /// A checksum of every question, in order: answers are taken for as long as the questions are the same.
     pub questions: Vec<u64>,
-    /// Irradiance straight from emitters, W·m⁻².
+    /// Irradiance straight from emitters and from the environment, W·m⁻².
     pub emitted: Vec<Rgb>,
+    /// The part of each that is from the environment, W·m⁻²; empty where there is none.
+    pub sky: Vec<Rgb>,
     /// What samples see of the reflectors.
     pub rows: Vec<Box<[Seen]>>,
     /// What was measured of the bake's residual: two differences of irradiance, and an irradiance, W·m⁻².
@@ -56,6 +58,10 @@ impl Answers {
         let is_bad =
             |seen: &Seen| ![seen.form_factor, seen.offset[0], seen.offset[1]].iter().all(|part| part.is_finite());
         number("answer about emitters", self.emitted.iter().position(|light| !light.is_finite()))?;
+        number("answer about the sky", self.sky.iter().position(|light| !light.is_finite()))?;
+        if !self.sky.is_empty() && self.sky.len() != self.emitted.len() {
+            return Err(SceneError::Index(format!("answer about the sky {}", self.sky.len())));
+        }
         number("answer about reflectors", self.rows.iter().position(|row| row.iter().any(is_bad)))?;
         let is_bad = |point: &[f64; 7]| !point.iter().all(|part| part.is_finite());
         number("answer about the residual", self.residuals.iter().position(is_bad))

@@ -53,7 +53,7 @@ impl Gather<'_> {
         let emitted_by = |sources: Vec<Source>, groups: Vec<u32>, sky: SkyView| {
             let (view, blockers) = (View::default(), leaf.blockers.clone());
             let alone = LeafGather { gather, polygon, centre, sources, groups, view, sky, blockers };
-            alone.emitted(position, inward, Cosine::Shading)
+            alone.emitted(position, inward, Cosine::Shading).total()
         };
         for source in &leaf.sources {
             let entry = found.entry(Sender::Polygon(source.polygon)).or_default();

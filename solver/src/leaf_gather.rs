@@ -117,6 +117,22 @@ pub struct SeenNode {
     pub offset: DVec2,
 }
 
+/// Irradiance straight from what shines by itself, W·m⁻².
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct DirectIrradiance {
+    /// From surfaces that emit.
+    pub emitters: Rgb,
+    /// From the scene's environment.
+    pub sky: Rgb,
+}
+
+impl DirectIrradiance {
+    /// From both.
+    pub fn total(&self) -> Rgb {
+        self.emitters + self.sky
+    }
+}
+
 /// Which of its sources' light a point is asked for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Light {
@@ -137,11 +153,11 @@ impl LeafGather<'_> {
                 self.emitted(position, inward, Cosine::Shading)
             }
         };
-        emitted + self.gather.irradiance_from(&seen)
+        emitted.total() + self.gather.irradiance_from(&seen)
     }
 
-    /// The part of the irradiance that comes straight from emitters, W·m⁻²: exact.
-    pub fn emitted(&self, position: DVec3, inward: DVec3, cosine: Cosine) -> Rgb {
+    /// The part of the irradiance that comes straight from emitters and from the sky: exact but where rays tell what is seen.
+    pub fn emitted(&self, position: DVec3, inward: DVec3, cosine: Cosine) -> DirectIrradiance {
         self.look(position, inward, (Light::Emitted, cosine), &mut Vec::new())
     }
 
@@ -251,8 +267,14 @@ impl LeafGather<'_> {
         }
     }
 
-    /// Irradiance from emitters, and the nodes of reflectors that are seen.
-    fn look(&self, position: DVec3, inward: DVec3, (wanted, cosine): (Light, Cosine), seen: &mut Vec<SeenNode>) -> Rgb {
+    /// Direct irradiance, and the nodes of reflectors that are seen.
+    fn look(
+        &self,
+        position: DVec3,
+        inward: DVec3,
+        (wanted, cosine): (Light, Cosine),
+        seen: &mut Vec<SeenNode>,
+    ) -> DirectIrradiance {
         let gather = self.gather;
         let mut from = gather.viewpoint(self.polygon, position, inward, cosine);
         from.inward = inward.reject_from_normalized(from.up).normalize_or_zero();
@@ -323,11 +345,11 @@ impl LeafGather<'_> {
                 }
             }
         }
-        if wanted != Light::Reflected {
-            total += self.light_of_sky(&from, &mut cones, &mut fragments);
-            total += self.light_of_faint_groups(&from);
+        if wanted == Light::Reflected {
+            return DirectIrradiance::default();
         }
-        total
+        let sky = self.light_of_sky(&from, &mut cones, &mut fragments);
+        DirectIrradiance { emitters: total + self.light_of_faint_groups(&from), sky }
     }
 
     /// What a point sees of a reflector that is too dim for its blockers to be projected: the links know what is visible of it

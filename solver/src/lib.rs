@@ -44,7 +44,7 @@ pub use element::{Elements, Node, NodeId, NodeKind, Patch};
 pub use form_factor::{exchange, form_factor, form_factor_at, point_form_factor};
 pub use irradiance::{Contact, Cosine, Gather};
 pub use lattice::{Fan, hemisphere, spread};
-pub use leaf_gather::{LeafGather, SeenNode};
+pub use leaf_gather::{DirectIrradiance, LeafGather, SeenNode};
 pub use linear_fit::colour_slope;
 pub use openings::{Openings, SeenCell};
 pub use shafts::Shafts;
