@@ -16,7 +16,7 @@ const SUPERSAMPLE: u32 = 3;
 #[derive(Debug, Args)]
 #[command(mut_arg("environment", |environment| environment.conflicts_with_all([
     "sampler", "radiance", "paths", "bounces", "budget", "level", "interval", "perceptual", "rule", "filter", "interpolation", "snapshots",
-    "sample_map", "seed",
+    "sample_map", "seed", "compare", "error_map", "supersample", "map", "relocate",
 ])))]
 pub struct RenderFlags {
     /// Scene, or a bake
