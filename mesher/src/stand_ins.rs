@@ -1,18 +1,10 @@
 //! Stand-ins: where light over reflectors is looked at in place of the samples of a mesh, and how much of each look a sample is.
 
-use glam::{DVec2, DVec3};
+use glam::DVec3;
 use scene::{Rgb, Scene};
-use solver::{Cosine, Patch, Solution, Visibility};
+use solver::{Cosine, SMALL_LEAF, Solution, Visibility, principal_axes};
 
 use crate::{Leaf, Mesh, SampleQuery, SampleTable};
-
-/// Area of leaves, as a part of that of all surfaces, below which light is looked at within the leaf and taken for linear, until
-/// a probe says otherwise: in a scene whose light is found by rays. More leaves what curves to probes, less looks at all
-/// corners of leaves that nobody will tell from their neighbours.
-const SMALL_LEAF: f64 = 1.0 / 12_000.0;
-
-/// Width of leaves, as a part of their length, below which light is taken for the same all across them.
-const NARROW: f64 = 0.25;
 
 /// How far from a contact its stand-ins lie, as parts of the way to the middle of the element. Nearer ones feel more of what
 /// is special to the contact, farther ones miss more of what curves.
@@ -176,48 +168,12 @@ fn leaves_of_samples(mesh: &Mesh, table: &SampleTable) -> Vec<Vec<u32>> {
     leaves
 }
 
-/// The middle of a convex outline in a patch's plane, and its principal axes, as long as the root mean square of what lies
-/// along them; the longer one alone if it is narrow. None without an area.
-fn principal_axes(outline: &[DVec3], patch: &Patch) -> Option<(DVec3, Vec<DVec3>)> {
-    let corners: Vec<DVec2> = outline.iter().map(|&corner| patch.along(corner - outline[0])).collect();
-    let (mut area, mut first, mut second) = (0.0, DVec2::ZERO, [0.0; 3]);
-    for edge in corners.get(1..)?.windows(2) {
-        let (a, b) = (edge[0], edge[1]);
-        let part = a.perp_dot(b) / 2.0;
-        let sum = a + b;
-        area += part;
-        first += sum * (part / 3.0);
-        let moment = |a: f64, b: f64, c: f64, d: f64, s: f64, t: f64| (a * b + c * d + s * t) * part / 12.0;
-        second[0] += moment(a.x, a.x, b.x, b.x, sum.x, sum.x);
-        second[1] += moment(a.x, a.y, b.x, b.y, sum.x, sum.y);
-        second[2] += moment(a.y, a.y, b.y, b.y, sum.y, sum.y);
-    }
-    let middle = first / area;
-    let [xx, xy, yy] = [
-        second[0] / area - middle.x * middle.x,
-        second[1] / area - middle.x * middle.y,
-        second[2] / area - middle.y * middle.y,
-    ];
-    let (mean, half) = ((xx + yy) / 2.0, ((xx - yy) / 2.0).hypot(xy));
-    let way = DVec2::from_angle(xy.atan2((xx - yy) / 2.0) / 2.0);
-    let [long, short] = [mean + half, mean - half].map(|square| square.max(0.0).sqrt());
-    if !(long.is_finite() && long > 0.0) {
-        return None;
-    }
-    let in_space = |way: DVec2| patch.u * way.x + patch.v * way.y;
-    let mut axes = vec![in_space(way) * long];
-    if short > NARROW * long {
-        axes.push(in_space(way.perp()) * short);
-    }
-    Some((outline[0] + in_space(middle), axes))
-}
-
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
 
     use proptest::prelude::*;
-    use solver::{SolveOptions, solve};
+    use solver::{Patch, SolveOptions, solve};
 
     use super::*;
     use crate::testing::scene_of;
@@ -229,20 +185,6 @@ mod tests {
 
     fn square(corner: DVec3, side: f64) -> Vec<DVec3> {
         [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)].map(|(x, y)| corner + DVec3::new(x, y, 0.0) * side).to_vec()
-    }
-
-    #[test]
-    fn principal_axes_of_nothing_a_strip_and_a_rectangle() {
-        assert_eq!(principal_axes(&[], &patch()), None);
-        assert_eq!(principal_axes(&[DVec3::ONE; 3], &patch()), None);
-        let rectangle = |x: f64, y: f64| [(0.0, 0.0), (x, 0.0), (x, y), (0.0, y)].map(|(x, y)| DVec3::new(x, y, 7.0));
-        // Gauss' points of a side lie at 1/√12 of it from the middle.
-        let (centre, axes) = principal_axes(&rectangle(1.0, 3.0), &patch()).unwrap();
-        assert!(centre.distance(DVec3::new(0.5, 1.5, 7.0)) < 1e-12);
-        assert!((axes[0].y.abs() - 3.0 / 12f64.sqrt()).abs() < 1e-12 && axes[0].x.abs() < 1e-12);
-        assert!((axes[1].x.abs() - 1.0 / 12f64.sqrt()).abs() < 1e-12 && axes.len() == 2);
-        let (_, axes) = principal_axes(&rectangle(5.0, 1.0), &patch()).unwrap();
-        assert!(axes.len() == 1 && axes[0].x.abs() > 1.0);
     }
 
     /// 420 small squares beside a large one, so that light is found by rays: over the small ones what is linear is reproduced

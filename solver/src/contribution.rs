@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use glam::DVec3;
 use scene::{Rgb, luminance};
 
+use crate::lamp_rays::FaintGroups;
 use crate::leaf_gather::{LeafGather, SeenNode, Source};
 use crate::ray_gather::View;
 use crate::sky_view::SkyView;
@@ -50,21 +51,22 @@ impl Gather<'_> {
         let leaf = self.over(leaf);
         let mut found: BTreeMap<Sender, Contribution> = BTreeMap::new();
         let LeafGather { gather, polygon, centre, .. } = leaf;
-        let emitted_by = |sources: Vec<Source>, groups: Vec<u32>, sky: SkyView| {
+        let emitted_by = |sources: Vec<Source>, faint: FaintGroups, sky: SkyView| {
             let (view, blockers) = (View::default(), leaf.blockers.clone());
-            let alone = LeafGather { gather, polygon, centre, sources, groups, view, sky, blockers };
+            let alone = LeafGather { gather, polygon, centre, sources, faint, view, sky, blockers };
             alone.emitted(position, inward, Cosine::Shading).total()
         };
         for source in &leaf.sources {
             let entry = found.entry(Sender::Polygon(source.polygon)).or_default();
             entry.blockers.extend(source.blockers.iter().flatten());
             if self.scene.material(source.polygon).emits() {
-                entry.emitted += emitted_by(vec![source.clone()], Vec::new(), SkyView::default());
+                entry.emitted += emitted_by(vec![source.clone()], FaintGroups::default(), SkyView::default());
             }
         }
-        let faint = emitted_by(Vec::new(), leaf.groups.clone(), SkyView::default());
+        let faint = emitted_by(Vec::new(), leaf.faint.clone(), SkyView::default());
         found.entry(Sender::FaintEmitters).or_default().emitted = faint;
-        found.entry(Sender::Sky).or_default().emitted = emitted_by(Vec::new(), Vec::new(), leaf.sky.clone());
+        found.entry(Sender::Sky).or_default().emitted =
+            emitted_by(Vec::new(), FaintGroups::default(), leaf.sky.clone());
         let mut seen = Vec::new();
         leaf.seen_nodes(position, inward, Cosine::Shading, &mut seen);
         let sender = |seen: &SeenNode| self.solution.elements.polygon_of(seen.node).map(Sender::Polygon);

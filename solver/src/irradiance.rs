@@ -17,10 +17,11 @@ use crate::backprojection::Viewpoint;
 use crate::clip::{Position, locate};
 use crate::emitter::{Emitter, emitter_tree, emitters};
 use crate::geometry::Geometry;
+use crate::lamp_rays::FaintGroups;
 use crate::leaf_gather::{LeafGather, SeenNode, Source};
 use crate::light_tree::{Horizon, LightTree};
 use crate::polygon_tree::PolygonTree;
-use crate::ray_gather::{RayGather, View, rays_for};
+use crate::ray_gather::{RayGather, SMALL_LEAF, View, rays_for};
 use crate::shafts::Shafts;
 use crate::sky_view::SkyView;
 use crate::solid::Solids;
@@ -76,6 +77,8 @@ pub struct Gather<'a> {
     /// Rays from a point, and their turn.
     pub(crate) sampling: (u32, u32),
     opening: Opening,
+    /// Area below which an element is small, m².
+    pub(crate) small: f64,
     /// Mean luminance of the radiosity that each polygon reflects, W·m⁻².
     radiosity: Vec<f64>,
 }
@@ -140,7 +143,21 @@ impl<'a> Gather<'a> {
         let tree = PolygonTree::new(scene);
         let emitter_tree = (solution.visibility == Visibility::Rays).then(|| emitter_tree(scene, &emitters));
         let rays = OnceLock::new();
-        Self { scene, solution, geometry, solids, tree, emitters, emitter_tree, rays, sampling, opening, radiosity }
+        let small = SMALL_LEAF * scene.surface_area();
+        Self {
+            scene,
+            solution,
+            geometry,
+            solids,
+            tree,
+            emitters,
+            emitter_tree,
+            rays,
+            sampling,
+            opening,
+            small,
+            radiosity,
+        }
     }
 
     /// The emitters, in a scene without links.
@@ -246,7 +263,7 @@ impl<'a> Gather<'a> {
                     polygon,
                     centre: elements.nodes[element as usize].centre,
                     sources: Vec::new(),
-                    groups: Vec::new(),
+                    faint: FaintGroups::default(),
                     view: self.rays().map(view).unwrap_or_default(),
                     sky: SkyView::default(),
                     blockers: Vec::new(),
@@ -347,7 +364,7 @@ impl<'a> Gather<'a> {
             polygon,
             centre,
             sources,
-            groups: Vec::new(),
+            faint: FaintGroups::default(),
             view: View::default(),
             sky: SkyView::default(),
             blockers,

@@ -1,5 +1,6 @@
 //! Light from emitters by rays: for those that are too faint at a point, or hidden by too much, to be projected.
 
+use std::cell::OnceCell;
 use std::f64::consts::PI;
 
 use glam::{DVec2, DVec3};
@@ -8,13 +9,47 @@ use scene::{Rgb, luminance};
 use crate::backprojection::Viewpoint;
 use crate::lattice::{Fan, STEP, shift};
 use crate::leaf_gather::LeafGather;
+use crate::principal_axes::principal_axes;
 use crate::ray_gather::ASIDE;
+use crate::{Cosine, NodeId};
 
 /// What rays to one emitter may scatter by, as a part of the budget, where half of it is hidden. Less takes more rays.
 const SCATTER: f64 = 0.2;
 
 /// Rays to one emitter at most.
 const MOST_RAYS: f64 = 25.0;
+
+/// Groups of emitters that are faint at an element, in a scene without links.
+#[derive(Clone, Default)]
+pub(crate) struct FaintGroups {
+    /// Their numbers in the tree of emitters.
+    groups: Vec<u32>,
+    element: NodeId,
+    /// Their light over a small element: found out when a point needs it first.
+    plane: OnceCell<Option<LightPlane>>,
+}
+
+impl FaintGroups {
+    pub fn new(groups: Vec<u32>, element: NodeId) -> Self {
+        Self { groups, element, plane: OnceCell::new() }
+    }
+}
+
+/// Irradiance that is linear over an element, W·m⁻².
+#[derive(Clone)]
+struct LightPlane {
+    centre: DVec3,
+    mean: Rgb,
+    /// Directions in the element's plane, m⁻¹, each with the light that is added per unit of their product with a place.
+    slopes: Vec<(DVec3, Rgb)>,
+}
+
+impl LightPlane {
+    fn at(&self, position: DVec3) -> Rgb {
+        let added = |&(way, slope): &(DVec3, Rgb)| slope * way.dot(position - self.centre);
+        (self.mean + self.slopes.iter().map(added).sum::<Rgb>()).max(Rgb::ZERO)
+    }
+}
 
 impl LeafGather<'_> {
     /// The share of what an outline sends to a point that arrives there, by rays to points spread evenly over it; `unoccluded`
@@ -36,10 +71,42 @@ impl LeafGather<'_> {
         Fan::new(outline).arriving(&origin, (shift(from.position, 0), rays), is_blocked).share
     }
 
-    /// Light from the groups of emitters that are faint at the leaf, W·m⁻²: one place of each is tried.
+    /// Light from the groups of emitters that are faint at the leaf, W·m⁻². Over a small leaf it is linear, but where it is looked at by
+    /// shading normals.
     pub(crate) fn light_of_faint_groups(&self, from: &Viewpoint) -> Rgb {
+        if self.faint.groups.is_empty() {
+            return Rgb::ZERO;
+        }
+        match self.faint.plane.get_or_init(|| self.plane_of_faint_groups()) {
+            Some(plane) if from.normal == from.up => plane.at(from.position),
+            _ => self.look_at_faint_groups(from),
+        }
+    }
+
+    /// The plane through that light at a few places of a small leaf.
+    fn plane_of_faint_groups(&self) -> Option<LightPlane> {
         let gather = self.gather;
-        let Some(tree) = gather.emitter_tree().filter(|_| !self.groups.is_empty()) else { return Rgb::ZERO };
+        let elements = &gather.solution.elements;
+        let element = self.faint.element;
+        if elements.nodes[element as usize].area >= gather.small {
+            return None;
+        }
+        let patch = &elements.patches[elements.patch_of(element)? as usize];
+        let (centre, axes) = principal_axes(elements.outline(element), patch)?;
+        let light = |place| self.look_at_faint_groups(&gather.viewpoint(self.polygon, place, DVec3::ZERO, Cosine::Own));
+        let (mut sum, mut slopes) = (Rgb::ZERO, Vec::new());
+        for &axis in &axes {
+            let ends = [light(centre + axis), light(centre - axis)];
+            sum += ends[0] + ends[1];
+            slopes.push((axis / axis.length_squared(), (ends[0] - ends[1]) / 2.0));
+        }
+        Some(LightPlane { centre, mean: sum / (2 * axes.len()) as f64, slopes })
+    }
+
+    /// The same at a point: one place of each group is tried.
+    fn look_at_faint_groups(&self, from: &Viewpoint) -> Rgb {
+        let gather = self.gather;
+        let Some(tree) = gather.emitter_tree() else { return Rgb::ZERO };
         let origin = from.aside(ASIDE * gather.geometry.size);
         let shift = shift(from.position, 0);
         let from_group = |(number, &group): (usize, &u32)| {
@@ -60,6 +127,6 @@ impl LeafGather<'_> {
             let exitance = gather.scene.material(polygon).exitance();
             exitance / luminance(exitance) * (tree.power(group) * per_area)
         };
-        self.groups.iter().enumerate().map(from_group).sum()
+        self.faint.groups.iter().enumerate().map(from_group).sum()
     }
 }

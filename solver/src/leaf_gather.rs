@@ -19,6 +19,7 @@ use crate::blocker::Blocker;
 use crate::clip::clip_convex;
 use crate::emitter::outline_of;
 use crate::form_factor::point_form_factor;
+use crate::lamp_rays::FaintGroups;
 use crate::ray_gather::View;
 use crate::sky_view::SkyView;
 use crate::{Cosine, Gather, NodeId};
@@ -49,8 +50,7 @@ pub struct LeafGather<'a> {
     /// Centre of the element, metres.
     pub(crate) centre: DVec3,
     pub(crate) sources: Vec<Source>,
-    /// Groups of emitters that are faint here, in a scene without links.
-    pub(crate) groups: Vec<u32>,
+    pub(crate) faint: FaintGroups,
     /// How its points look at reflectors, in a scene without links.
     pub(crate) view: View,
     /// What its points may see of the sky.

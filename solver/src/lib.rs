@@ -23,6 +23,7 @@ mod linear_fit;
 mod openings;
 mod oracle;
 mod polygon_tree;
+mod principal_axes;
 mod quadrature;
 mod ray_gather;
 mod refine;
@@ -47,6 +48,8 @@ pub use lattice::{Fan, hemisphere, spread};
 pub use leaf_gather::{DirectIrradiance, LeafGather, SeenNode};
 pub use linear_fit::colour_slope;
 pub use openings::{Openings, SeenCell};
+pub use principal_axes::principal_axes;
+pub use ray_gather::SMALL_LEAF;
 pub use shafts::Shafts;
 pub use sky_cells::{SkyCell, SkyCells};
 pub use solution::{

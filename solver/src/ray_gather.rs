@@ -28,9 +28,12 @@ const SCATTER: f64 = 0.6;
 const LEAST_RAYS: f64 = 64.0;
 const MOST_RAYS: f64 = 4096.0;
 
-/// Area of elements, as a part of that of all surfaces, from which on their points have all rays; those of smaller ones have fewer,
-/// as the root of the area is less, down to `FEW_RAYS`: there are many, and what each is off by is lost among them.
-const AMPLE: f64 = 1.0 / 12_000.0;
+/// Area of elements, as a part of that of all surfaces, below which an element is small in a scene whose light is found by rays: what
+/// is found by rays is looked at within it and taken for linear, until a probe says otherwise. More leaves what curves to
+/// probes, less looks at all corners of leaves that nobody will tell from their neighbours.
+pub const SMALL_LEAF: f64 = 1.0 / 12_000.0;
+
+/// Rays from points of small elements, as a part of all: as the root of the area is less, down to this. There are many of them.
 const FEW_RAYS: f64 = 0.25;
 
 /// How far from a contact a point is taken to be, along its direction of approach, as a fraction of the scene's size: above
@@ -120,7 +123,7 @@ impl RayGather {
             reflectances: scene.polygon_ids().map(|polygon| luminance(scene.reflectance(polygon))).collect(),
             size: scene.size(),
             rays,
-            ample: AMPLE * scene.surface_area(),
+            ample: SMALL_LEAF * scene.surface_area(),
             turn,
             budget,
         }

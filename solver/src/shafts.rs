@@ -9,6 +9,7 @@ use scene::{Plane, luminance};
 
 use crate::emitter::{Emitter, outline_of};
 use crate::form_factor::form_factor_at;
+use crate::lamp_rays::FaintGroups;
 use crate::leaf_gather::{LeafGather, Source};
 use crate::polygon_tree::Stands;
 use crate::ray_gather::View;
@@ -17,10 +18,10 @@ use crate::{Gather, Interaction, NodeId};
 
 /// Emitters that send an element at most this part of the budget, all together, are one group, of which one is tried. More
 /// scatters.
-const FAINT_GROUP: f64 = 0.2;
+const FAINT_GROUP: f64 = 0.8;
 
 /// An emitter that sends at most this part of the budget to an element's middle is seen by rays there.
-const FAINT: f64 = 1.0;
+const FAINT: f64 = 0.5;
 
 /// An emitter that sends at least this many budgets to an element's middle is strong: its shadows have edges to follow. With less
 /// a hall of many lamps has lines everywhere, which next to nothing changes across.
@@ -125,7 +126,8 @@ impl<'a> Gather<'a> {
             .collect();
         blockers.sort_unstable();
         blockers.dedup();
-        LeafGather { gather: self, polygon, centre, sources, groups: cut.groups, view: View::default(), sky, blockers }
+        let faint = FaintGroups::new(cut.groups, element);
+        LeafGather { gather: self, polygon, centre, sources, faint, view: View::default(), sky, blockers }
     }
 
     /// What stands in the shaft between an emitter and an element.
