@@ -10,7 +10,7 @@ use scene::{Baked, Scene, Sky};
 
 use crate::args::{EnvironmentFlags, LightFlags, SceneFlags};
 use crate::bake::missed;
-use crate::environment::environment;
+use crate::environment::{environment, up_axis};
 use crate::failure::Usage;
 use crate::output::Outputs;
 use crate::pipeline::{self, Onlooker};
@@ -53,7 +53,7 @@ pub fn read_scene(path: &Path, flags: &SceneFlags) -> Result<(Imported, f64)> {
     let stage = Stage::start("import");
     let mut imported = formats::read_scene_as(path, if flags.two_sided { Sides::Both } else { Sides::AsWound })?;
     if let Some(source) = &flags.sky.environment {
-        let (mut environment, warnings) = environment(&flags.sky, source)?;
+        let (mut environment, warnings) = environment(&flags.sky, source, up_axis(path))?;
         if let Sky::Map(map) = environment.sky {
             environment.sky = Sky::Map(map.bounded());
         }

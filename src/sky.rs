@@ -5,12 +5,12 @@ use glam::Vec3;
 use renderer::{
     Coherence, EnvironmentLights, Eye, SkyIllumination, SkyPicture, SkySeconds, SurfacePoint, Visibility, sky_picture,
 };
-use scene::{Baked, Bvh, Display, Environment, Exposure, Rgb, Sky, luminance};
+use scene::{Baked, Bvh, Display, Environment, Exposure, Rgb, Scene, Sky, luminance};
 use serde::Serialize;
 
 use crate::args::{ExposureChoice, ImageKind, RenderFlags, SceneFlags, SkyFlags, SkySource};
 use crate::baked_points::BakedPoints;
-use crate::environment::environment;
+use crate::environment::{environment, up_axis};
 use crate::failure::{Outcome, Usage};
 use crate::input::Input;
 use crate::output::{Output, Outputs};
@@ -30,16 +30,20 @@ pub fn run(flags: &RenderFlags, source: &SkySource, outputs: &Outputs) -> Result
     let viewpoint = flags.camera.viewpoint()?;
     let sky = &flags.sky;
     let visibility = visibility(sky)?;
-    let (environment, warnings) = environment(&flags.reading.sky, source)?;
-    for warning in &warnings {
-        say(format_args!("warning: {warning}"));
-    }
     let output = outputs.claim(&flags.output)?;
     let claim = |path: &Option<std::path::PathBuf>| path.as_deref().map(|path| outputs.claim(path)).transpose();
     let (ray_map, cells) = (claim(&sky.ray_map)?, claim(&sky.sky_picture)?);
     // The environment is the picture's: that of a scene or a bake stays as it is.
     let reading = SceneFlags { two_sided: flags.reading.two_sided, ..SceneFlags::default() };
     let input = Input::read(&flags.input, &reading)?;
+    let up = match &input {
+        Input::Baked(Baked { scene: Scene { environment: Some(own), .. }, .. }) => own.up,
+        _ => up_axis(&flags.input),
+    };
+    let (environment, warnings) = environment(&flags.reading.sky, source, up)?;
+    for warning in &warnings {
+        say(format_args!("warning: {warning}"));
+    }
     let (scene, bounce) = match &input {
         Input::Scene(scene) => (scene, None),
         Input::Baked(baked) => {

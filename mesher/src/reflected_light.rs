@@ -84,7 +84,9 @@ impl ReflectedLight {
         self.coarse = coarse;
         let places = self.places(solution, fine);
         let rows: Vec<&Row> = stand_ins.queries.iter().map(|query| self.row(query, inquiry)).collect();
-        let receive = |solution: &Solution| stand_ins.of_samples(&Radiosity::of(scene, solution).received(&rows));
+        let table = &self.coarse.table;
+        let receive =
+            |solution: &Solution| stand_ins.of_samples(table, &Radiosity::of(scene, solution).received(&rows));
         let samples = self.coarse.table.queries.len();
         // From darkness, so that what is dark stays exactly dark; later on from the light that is known, where all bounces count.
         let mut values =

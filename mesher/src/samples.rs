@@ -5,6 +5,7 @@
 //! contact, or one for each direction at a corner; there triangles share what is theirs to share.
 
 use std::collections::HashMap;
+use std::hash::{DefaultHasher, Hash, Hasher};
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -30,14 +31,19 @@ pub struct SampleQuery {
     pub cosine: Cosine,
 }
 
-/// Position and direction of approach of a query, to the bit, on its polygon, by a normal: what its answer depends on.
-pub(crate) type QueryKey = (u32, [u64; 6], Cosine);
+/// What the answer to a query depends on, its position and direction of approach to the bit, on its polygon, by a normal: as two
+/// checksums of 64 bits, of which no two queries of a bake have both in common. In full it would be three times as long.
+pub(crate) type QueryKey = [u64; 2];
 
 impl SampleQuery {
     pub(crate) fn key(&self) -> QueryKey {
         let [x, y, z] = self.position.to_array().map(f64::to_bits);
         let [u, v, w] = self.inward.to_array().map(f64::to_bits);
-        (self.polygon, [x, y, z, u, v, w], self.cosine)
+        [0u8, 1].map(|first| {
+            let mut checksum = DefaultHasher::new();
+            (first, self.polygon, [x, y, z, u, v, w], self.cosine).hash(&mut checksum);
+            checksum.finish()
+        })
     }
 
     /// The same question about the light that is looked at.
@@ -132,6 +138,7 @@ pub fn sample_table(
         });
         table.triangles.push(samples);
     }
+    table.queries.shrink_to_fit();
     table
 }
 

@@ -1,10 +1,11 @@
 //! Stand-ins: where light over reflectors is looked at in place of the samples of a mesh, and how much of each look a sample is.
 
 use glam::DVec3;
+use rayon::prelude::*;
 use scene::{Rgb, Scene};
 use solver::{Cosine, SMALL_LEAF, Solution, Visibility, principal_axes};
 
-use crate::{Leaf, Mesh, SampleQuery, SampleTable};
+use crate::{Leaf, Mesh, MeshTriangle, SampleQuery, SampleTable};
 
 /// How far from a contact its stand-ins lie, as parts of the way to the middle of the element. Nearer ones feel more of what
 /// is special to the contact, farther ones miss more of what curves.
@@ -15,16 +16,30 @@ const ASIDE: f64 = 0.07;
 pub(crate) struct StandIns {
     /// Where light is looked at. Those of one element stand together.
     pub queries: Vec<SampleQuery>,
-    /// By sample the first of its shares, and their number at the end.
-    first: Vec<usize>,
-    /// Number of a query, and how many times its light counts.
-    shares: Vec<(u32, f64)>,
-    /// Samples without shares, each with the two that it is the mean of.
-    between: Vec<(u32, [u32; 2])>,
+    /// By sample, what its light is told from.
+    told: Vec<Told>,
+    /// Light over small leaves.
+    planes: Vec<LeafPlane>,
+    /// Numbers of planes; those around one sample follow each other.
+    around: Vec<u32>,
+}
+
+/// What the light of a sample is told from.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Told {
+    /// A look at its own place: the query's number.
+    Look(u32),
+    /// Two looks aside of a contact, the nearer first: what the light is there, continued in a straight line.
+    Aside(u32),
+    /// The mean of the planes of the leaves around: the first of them, and their end, in `around`.
+    Planes([u32; 2]),
+    /// The mean of two other samples.
+    Between([u32; 2]),
 }
 
 /// Light over a small leaf as a plane: through what it is at two places or four, about the middle along the leaf's principal
-/// axes. The two along an axis are those of Gauss' rule of two points over a rectangle, and lie within any convex outline.
+/// axes ([`principal_axes`]).
+#[derive(Clone, Debug, PartialEq)]
 struct LeafPlane {
     /// The first of its queries; those of an axis follow each other.
     first: u32,
@@ -48,7 +63,7 @@ impl StandIns {
             Visibility::Links => 0.0,
         };
         let mut stand_ins = Self::default();
-        let planes: Vec<Option<LeafPlane>> = leaves
+        let plane_of: Vec<Option<u32>> = leaves
             .iter()
             .map(|leaf| {
                 let is_small = solution.elements.nodes[leaf.element as usize].area < small;
@@ -56,36 +71,47 @@ impl StandIns {
             })
             .collect();
         let leaves_of = leaves_of_samples(mesh, table);
-        let around = |sample: usize| -> Option<Vec<&LeafPlane>> {
-            leaves_of[sample].iter().map(|&leaf| planes[leaf as usize].as_ref()).collect()
-        };
-        stand_ins.between = between_corners(table, looked_at, |sample| around(sample as usize).is_some());
-        for (sample, query) in table.queries.iter().enumerate() {
-            stand_ins.first.push(stand_ins.shares.len());
-            if stand_ins.between.binary_search_by_key(&(sample as u32), |(sample, _)| *sample).is_ok() {
-                continue;
-            }
-            match around(sample) {
-                Some(around) if !around.is_empty() => {
-                    let part = 1.0 / around.len() as f64;
-                    around.into_iter().for_each(|plane| plane.share(query.position, part, &mut stand_ins.shares));
-                }
-                _ => stand_ins.look_at(solution, query),
-            }
+        let mut is_over_planes = vec![true; table.queries.len()];
+        for &(sample, leaf) in &leaves_of {
+            is_over_planes[sample as usize] &= plane_of[leaf as usize].is_some();
         }
-        stand_ins.first.push(stand_ins.shares.len());
+        let between = between_corners(table, looked_at, |sample| is_over_planes[sample as usize]);
+        let mut rest = leaves_of.as_slice();
+        for (sample, query) in (0..).zip(&table.queries) {
+            let own = rest.split_off(..rest.partition_point(|pair| pair.0 == sample)).unwrap_or_default();
+            let told = if let Ok(place) = between.binary_search_by_key(&sample, |(sample, _)| *sample) {
+                Told::Between(between[place].1)
+            } else if is_over_planes[sample as usize] && !own.is_empty() {
+                let first = stand_ins.around.len() as u32;
+                stand_ins.around.extend(own.iter().filter_map(|&(_, leaf)| plane_of[leaf as usize]));
+                Told::Planes([first, stand_ins.around.len() as u32])
+            } else {
+                stand_ins.look_at(solution, query)
+            };
+            stand_ins.told.push(told);
+        }
         stand_ins
     }
 
-    /// The samples' light, from that at the queries; never negative.
-    pub fn of_samples(&self, looked: &[Rgb]) -> Vec<Rgb> {
-        let sample = |range: &[usize]| {
-            let shares = self.shares[range[0]..range[1]].iter();
-            shares.map(|&(query, part)| looked[query as usize] * part).sum::<Rgb>().max(Rgb::ZERO)
+    /// The light of the samples of the same table, from that at the queries; never negative.
+    pub fn of_samples(&self, table: &SampleTable, looked: &[Rgb]) -> Vec<Rgb> {
+        let look = |query: u32| looked[query as usize];
+        let sample = |(told, query): (&Told, &SampleQuery)| match *told {
+            Told::Look(number) => look(number),
+            Told::Aside(nearer) => look(nearer) * 2.0 - look(nearer + 1),
+            Told::Planes([first, end]) => {
+                let around = &self.around[first as usize..end as usize];
+                let light = |&plane: &u32| self.planes[plane as usize].at(query.position, look);
+                around.iter().map(light).sum::<Rgb>() / around.len() as f64
+            }
+            Told::Between(_) => Rgb::ZERO,
         };
-        let mut samples: Vec<Rgb> = self.first.windows(2).map(sample).collect();
-        for &(sample, [from, to]) in &self.between {
-            samples[sample as usize] = (samples[from as usize] + samples[to as usize]) / 2.0;
+        let pairs = self.told.par_iter().zip(&table.queries).with_min_len(256);
+        let mut samples: Vec<Rgb> = pairs.map(|pair| sample(pair).max(Rgb::ZERO)).collect();
+        for (sample, told) in self.told.iter().enumerate() {
+            if let Told::Between([from, to]) = *told {
+                samples[sample] = (samples[from as usize] + samples[to as usize]) / 2.0;
+            }
         }
         samples
     }
@@ -95,40 +121,41 @@ impl StandIns {
     /// At a contact the slope of the light over reflectors is infinite (it goes with d ln d at the distance d), and an
     /// interpolant through the limit is off over all of the leaf. One through what the light is a little aside, continued in a
     /// straight line, is off in a strip.
-    fn look_at(&mut self, solution: &Solution, query: &SampleQuery) {
+    fn look_at(&mut self, solution: &Solution, query: &SampleQuery) -> Told {
         let number = self.queries.len() as u32;
         if query.inward == DVec3::ZERO {
             self.queries.push(*query);
-            self.shares.push((number, 1.0));
-            return;
+            return Told::Look(number);
         }
         let centre = solution.elements.nodes[query.element as usize].centre;
         let aside =
             |part: f64| SampleQuery { position: query.position.lerp(centre, part), inward: DVec3::ZERO, ..*query };
         self.queries.extend([aside(ASIDE), aside(2.0 * ASIDE)]);
-        self.shares.extend([(number, 2.0), (number + 1, -1.0)]);
+        Told::Aside(number)
     }
 
-    /// Looks at places within a leaf. None if it has no extent.
-    fn look_within(&mut self, solution: &Solution, leaf: &Leaf) -> Option<LeafPlane> {
+    /// Looks at places within a leaf; the number of its plane. None if it has no extent.
+    fn look_within(&mut self, solution: &Solution, leaf: &Leaf) -> Option<u32> {
         let patch = solution.elements.patch_of(leaf.element)?;
         let (centre, axes) = principal_axes(&leaf.outline, &solution.elements.patches[patch as usize])?;
         let first = self.queries.len() as u32;
         let Leaf { polygon, element, .. } = *leaf;
         let query = |position| SampleQuery { position, polygon, element, inward: DVec3::ZERO, cosine: Cosine::Own };
         self.queries.extend(axes.iter().flat_map(|&axis| [query(centre + axis), query(centre - axis)]));
-        Some(LeafPlane { first, centre, axes })
+        self.planes.push(LeafPlane { first, centre, axes });
+        Some(self.planes.len() as u32 - 1)
     }
 }
 
 impl LeafPlane {
-    /// Adds what the plane is at a position, times `part`.
-    fn share(&self, position: DVec3, part: f64, shares: &mut Vec<(u32, f64)>) {
-        let even = part / (2 * self.axes.len()) as f64;
-        for (query, axis) in (self.first..).step_by(2).zip(&self.axes) {
-            let slope = part * axis.dot(position - self.centre) / (2.0 * axis.length_squared());
-            shares.extend([(query, even + slope), (query + 1, even - slope)]);
-        }
+    /// The light at a position, from that of the queries.
+    fn at(&self, position: DVec3, look: impl Fn(u32) -> Rgb) -> Rgb {
+        let along = |(query, axis): (u32, &DVec3)| {
+            let slope = axis.dot(position - self.centre) / axis.length_squared();
+            let [from, to] = [query, query + 1].map(&look);
+            (from + to) / (2 * self.axes.len()) as f64 + (from - to) * (slope / 2.0)
+        };
+        (self.first..).step_by(2).zip(&self.axes).map(along).sum()
     }
 }
 
@@ -154,34 +181,24 @@ fn between_corners(
     between
 }
 
-/// By sample, the leaves whose triangles use it, ascending.
-fn leaves_of_samples(mesh: &Mesh, table: &SampleTable) -> Vec<Vec<u32>> {
-    let mut leaves: Vec<Vec<u32>> = vec![Vec::new(); table.queries.len()];
-    for (triangle, samples) in mesh.triangles.iter().zip(&table.triangles) {
-        for &sample in samples {
-            let leaves = &mut leaves[sample as usize];
-            if leaves.last() != Some(&triangle.leaf) {
-                leaves.push(triangle.leaf);
-            }
-        }
-    }
-    leaves
+/// Samples with the leaves whose triangles use them, ascending, each pair once.
+fn leaves_of_samples(mesh: &Mesh, table: &SampleTable) -> Vec<(u32, u32)> {
+    let of_triangle = |(triangle, samples): (&MeshTriangle, &[u32; 6])| samples.map(|sample| (sample, triangle.leaf));
+    let mut pairs: Vec<(u32, u32)> = mesh.triangles.iter().zip(&table.triangles).flat_map(of_triangle).collect();
+    pairs.par_sort_unstable();
+    pairs.dedup();
+    pairs
 }
 
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
 
-    use proptest::prelude::*;
-    use solver::{Patch, SolveOptions, solve};
+    use solver::{SolveOptions, solve};
 
     use super::*;
     use crate::testing::scene_of;
     use crate::{edge_table, leaf_meshes, sample_table};
-
-    fn patch() -> Patch {
-        Patch { polygon: 0, root: 0, origin: DVec3::ZERO, u: DVec3::X, v: DVec3::Y }
-    }
 
     fn square(corner: DVec3, side: f64) -> Vec<DVec3> {
         [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)].map(|(x, y)| corner + DVec3::new(x, y, 0.0) * side).to_vec()
@@ -209,7 +226,7 @@ mod tests {
         let stand_ins = StandIns::new(&scene, &solution, &leaves, &mesh, (&table, &looked_at));
         let light = |position: DVec3| Rgb::new(1.0, 2.0, 3.0) * (1.0 + position.x + 2.0 * position.y);
         let looked: Vec<Rgb> = stand_ins.queries.iter().map(|query| light(query.position)).collect();
-        let samples = stand_ins.of_samples(&looked);
+        let samples = stand_ins.of_samples(&table, &looked);
         for (sample, query) in samples.iter().zip(&table.queries) {
             assert!((*sample - light(query.position)).abs().max_element() < 1e-12);
         }
@@ -228,33 +245,12 @@ mod tests {
         let [own, common, other] = [(11, [10, 12]), (13, [12, 14]), (15, [14, 10])];
         assert_eq!(between, [own, common, other, (16, [12, 17])]);
         assert_eq!(between_corners(&table, &(0..9).collect::<Vec<u32>>(), |_| true), []);
-        let stand_ins = StandIns {
-            first: vec![0, 1, 2, 2],
-            shares: vec![(0, 1.0), (1, 1.0)],
-            between: vec![(2, [0, 1])],
-            ..StandIns::default()
-        };
-        assert_eq!(stand_ins.of_samples(&[Rgb::ONE, Rgb::splat(3.0)]), [1.0, 3.0, 2.0].map(Rgb::splat));
-    }
-
-    /// Angles at which corners lie on a circle.
-    fn angles() -> impl Strategy<Value = Vec<f64>> {
-        prop::collection::vec(0.0..std::f64::consts::TAU, 3..9)
-    }
-
-    proptest! {
-        #[test]
-        fn looks_lie_within_convex_outlines(mut angles in angles(), squeeze in 0.05..1.0f64) {
-            angles.sort_by(f64::total_cmp);
-            let outline: Vec<DVec3> =
-                angles.iter().map(|angle| DVec3::new(angle.cos(), angle.sin() * squeeze, 2.0)).collect();
-            let Some((centre, axes)) = principal_axes(&outline, &patch()) else { return Ok(()) };
-            for place in axes.iter().flat_map(|&axis| [centre + axis, centre - axis]) {
-                for (i, &corner) in outline.iter().enumerate() {
-                    let edge = outline[(i + 1) % outline.len()] - corner;
-                    prop_assert!(edge.cross(place - corner).z > -1e-9);
-                }
-            }
-        }
+        let stand_ins =
+            StandIns { told: vec![Told::Look(0), Told::Aside(0), Told::Between([0, 1])], ..StandIns::default() };
+        let query =
+            SampleQuery { position: DVec3::ZERO, polygon: 0, element: 0, inward: DVec3::ZERO, cosine: Cosine::Own };
+        let table = SampleTable { queries: vec![query; 3], triangles: Vec::new() };
+        let samples = stand_ins.of_samples(&table, &[Rgb::splat(3.0), Rgb::ONE]);
+        assert_eq!(samples, [3.0, 5.0, 4.0].map(Rgb::splat));
     }
 }

@@ -29,6 +29,10 @@ const SMALLEST_PIECE: f64 = 1e-12;
 /// grows with the product of both numbers.
 const MOST_CANDIDATES: usize = 32;
 
+/// Segments in a piece from which on it is divided evenly first: lines as they come would peel off one box of a hall after another,
+/// and all others would be looked at again for each. Fewer cut up more of what stands on one floor.
+const MANY_SEGMENTS: usize = 1000;
+
 /// Contact and intersection lines on every polygon, ascending in the other polygon.
 ///
 /// A polygon contributes the segment along which it crosses the receiver's plane, the edges with which it stands on
@@ -216,9 +220,33 @@ impl Knife {
         }
     }
 
+    /// Divides a piece along one of the lines in it; none if nothing is left to divide.
+    fn best_split(&self, piece: &[DVec3], segments: &[Segment], lines: &[Line]) -> Option<[Vec<DVec3>; 2]> {
+        let even = (segments.len() >= MANY_SEGMENTS).then(|| self.even_split(piece, segments, lines)).flatten();
+        even.or_else(|| self.clean_split(piece, segments, lines))
+    }
+
+    /// Divides a piece along that of a few lines from all over it which leaves the fewest segments in the fuller half.
+    fn even_split(&self, piece: &[DVec3], segments: &[Segment], lines: &[Line]) -> Option<[Vec<DVec3>; 2]> {
+        let fuller = |line: &Line| {
+            let mut in_halves = [0, 0];
+            for segment in segments {
+                let [start, end] = segment.ends.map(|point| line.distance(point));
+                in_halves[0] += usize::from(start.max(end) > self.tolerance);
+                in_halves[1] += usize::from(start.min(end) < -self.tolerance);
+            }
+            in_halves[0].max(in_halves[1])
+        };
+        let candidates = segments.iter().step_by(segments.len().div_ceil(MOST_CANDIDATES));
+        let mut ranked: Vec<(usize, usize)> =
+            candidates.map(|segment| (fuller(&lines[segment.line]), segment.line)).collect();
+        ranked.sort_unstable();
+        ranked.into_iter().find_map(|(_, line)| self.split(piece, &lines[line]))
+    }
+
     /// Divides a piece along the line that divides the fewest other segments; among those, along the one that leaves
     /// the fattest pieces, the first of equals.
-    fn best_split(&self, piece: &[DVec3], segments: &[Segment], lines: &[Line]) -> Option<[Vec<DVec3>; 2]> {
+    fn clean_split(&self, piece: &[DVec3], segments: &[Segment], lines: &[Line]) -> Option<[Vec<DVec3>; 2]> {
         let mut best: Option<(usize, f64, [Vec<DVec3>; 2])> = None;
         let mut tried: Vec<usize> = Vec::new();
         for segment in segments {
@@ -389,6 +417,20 @@ mod tests {
         let cuts = contact_lines(&closed);
         assert_eq!(cuts[0].len(), 8);
         assert_eq!(pieces_of(&closed, 0, &cuts[0]), pieces);
+    }
+
+    /// More lines than are compared one by one: divided evenly first, with hardly more pieces than each post alone makes.
+    #[test]
+    fn a_floor_full_of_posts() {
+        let post = |i: u32| {
+            let place = v(f64::from(i % 17) * 0.23 + 0.05, f64::from(i / 17) * 0.23 + 0.03 * f64::from(i % 3), 0.0);
+            sides(place, place + v(0.1, 0.08, 1.0))
+        };
+        let scene = on_floor(&(0..260).flat_map(post).collect::<Vec<_>>());
+        let cuts = contact_lines(&scene);
+        assert!(cuts[0].len() > MANY_SEGMENTS);
+        let pieces = pieces_of(&scene, 0, &cuts[0]);
+        assert!(pieces.len() < 260 * 5, "{} pieces", pieces.len());
     }
 
     #[test]

@@ -85,6 +85,8 @@ impl PolygonTree {
             is_total |= occlusion == Occlusion::Total;
             occlusion != Occlusion::Clear
         });
+        // Shafts are kept by the hundred thousand.
+        polygons.shrink_to_fit();
         if is_total { Stands::All } else { Stands::Some(polygons) }
     }
 

@@ -48,6 +48,8 @@ pub fn principal_axes(outline: &[DVec3], patch: &Patch) -> Option<(DVec3, Vec<DV
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
+    use proptest::prelude::*;
+
     use super::*;
 
     fn patch() -> Patch {
@@ -66,5 +68,26 @@ mod tests {
         assert!((axes[1].x.abs() - 1.0 / 12f64.sqrt()).abs() < 1e-12 && axes.len() == 2);
         let (_, axes) = principal_axes(&rectangle(5.0, 1.0), &patch()).unwrap();
         assert!(axes.len() == 1 && axes[0].x.abs() > 1.0);
+    }
+
+    /// Angles at which corners lie on a circle.
+    fn angles() -> impl Strategy<Value = Vec<f64>> {
+        prop::collection::vec(0.0..std::f64::consts::TAU, 3..9)
+    }
+
+    proptest! {
+        #[test]
+        fn looks_lie_within_convex_outlines(mut angles in angles(), squeeze in 0.05..1.0f64) {
+            angles.sort_by(f64::total_cmp);
+            let outline: Vec<DVec3> =
+                angles.iter().map(|angle| DVec3::new(angle.cos(), angle.sin() * squeeze, 2.0)).collect();
+            let Some((centre, axes)) = principal_axes(&outline, &patch()) else { return Ok(()) };
+            for place in axes.iter().flat_map(|&axis| [centre + axis, centre - axis]) {
+                for (i, &corner) in outline.iter().enumerate() {
+                    let edge = outline[(i + 1) % outline.len()] - corner;
+                    prop_assert!(edge.cross(place - corner).z > -1e-9);
+                }
+            }
+        }
     }
 }

@@ -21,9 +21,9 @@ pub struct EnvironmentFlags {
     /// What the sky's light is multiplied by; the zenith of a CIE sky has 1 W/(sr m²)
     #[arg(long, value_name = "F", default_value_t = 1.0, value_parser = positive, requires = "environment", allow_hyphen_values = true)]
     pub sky_scale: f64,
-    /// The axis of the scene that points up under the sky
-    #[arg(long, default_value = "z", value_parser = up_axis(), requires = "environment")]
-    pub sky_up: UpAxis,
+    /// The axis of the scene that points up under the sky [default: y in glTF files, that of a bake's own sky, else z]
+    #[arg(long, value_parser = up_axis(), requires = "environment")]
+    pub sky_up: Option<UpAxis>,
     /// Where the sun stands in a CIE sky: degrees clockwise from north, which is y where z is up, and over the horizon
     /// [default: 135,45]
     #[arg(long, value_name = "AZIMUTH,ALTITUDE", value_parser = sun, requires = "environment", allow_hyphen_values = true)]
