@@ -1,7 +1,7 @@
 //! Points on the surfaces of a scene: how a path goes from one to the next, and how to spread many by area.
 
 use glam::DVec3;
-use scene::{Bvh, Plane, Ray, Scene, other_sides};
+use scene::{Bvh, Plane, Ray, Scene, ShearedRay, other_sides};
 
 use crate::sequence::{Kronecker, Stream};
 
@@ -133,6 +133,16 @@ impl<'a> Surfaces<'a> {
         let far = (receiver.position - self.middle).length() + self.size;
         let stands = |id| !self.is_on(receiver, id);
         !self.bvh.is_blocked_among(receiver.position, receiver.position + direction * far, stands)
+    }
+
+    /// Whether a polygon crosses a ray before its length.
+    pub fn crosses(&self, polygon: u32, ray: &Ray) -> bool {
+        let sheared = ShearedRay::new(ray);
+        let corners = &self.scene.corners[self.scene.polygons[polygon as usize].corner_range()];
+        let at = |i: usize| self.scene.vertices[corners[i] as usize];
+        let hits =
+            |i: usize| sheared.intersect(&[at(0), at(i - 1), at(i)]).is_some_and(|(distance, ..)| distance < 1.0);
+        (2..corners.len()).any(hits)
     }
 
     /// What a receiver sees in a direction.

@@ -133,17 +133,22 @@ impl Bvh {
 
     /// Whether anything lies between two points, ends excluded by `margin` (a fraction of the distance).
     pub fn is_blocked(&self, from: DVec3, to: DVec3, margin: f64) -> bool {
-        self.blocked(from, to, |_, distance| distance > margin && distance < 1.0 - margin)
+        self.blocker(from, to, |_, distance| distance > margin && distance < 1.0 - margin).is_some()
     }
 
-    fn blocked(&self, from: DVec3, to: DVec3, accept: impl Fn(u32, f64) -> bool) -> bool {
+    fn blocker(&self, from: DVec3, to: DVec3, accept: impl Fn(u32, f64) -> bool) -> Option<u32> {
         let ray = Ray { origin: from, direction: to - from };
         let sheared = ShearedRay::new(&ray);
-        let hits =
-            |slot: usize| sheared.intersect(&self.triangles[slot]).is_some_and(|(d, ..)| accept(self.owners[slot], d));
-        let missed =
-            self.bvh.ray_traverse_miss(library_ray(&ray, 1.0), |_, slot| if hits(slot) { 0.0 } else { f32::INFINITY });
-        !missed
+        let mut found = None;
+        self.bvh.ray_traverse_miss(library_ray(&ray, 1.0), |_, slot| {
+            let owner = self.owners[slot];
+            let hits = sheared.intersect(&self.triangles[slot]).is_some_and(|(distance, ..)| accept(owner, distance));
+            if hits {
+                found = Some(owner);
+            }
+            if hits { 0.0 } else { f32::INFINITY }
+        });
+        found
     }
 
     /// The nearest triangle that the ray meets, from either side, among those whose id `accept` takes: without the
@@ -154,7 +159,13 @@ impl Bvh {
 
     /// Whether anything whose id `accept` takes lies strictly between two points.
     pub fn is_blocked_among(&self, from: DVec3, to: DVec3, accept: impl Fn(u32) -> bool) -> bool {
-        self.blocked(from, to, |id, distance| distance < 1.0 && accept(id))
+        self.blocker_among(from, to, accept).is_some()
+    }
+
+    /// The id of something that `accept` takes and that lies strictly between two points: of several, the one that is met first
+    /// on the way through the hierarchy.
+    pub fn blocker_among(&self, from: DVec3, to: DVec3, accept: impl Fn(u32) -> bool) -> Option<u32> {
+        self.blocker(from, to, |id, distance| distance < 1.0 && accept(id))
     }
 
     /// Calls `visit` with the id of every triangle whose padded box a segment touches, in no particular order.
