@@ -72,15 +72,17 @@ impl LeafGather<'_> {
     }
 
     /// Light from the groups of emitters that are faint at the leaf, W·m⁻². Over a small leaf it is linear, but where it is looked at by
-    /// shading normals.
+    /// shading normals or a bake is checked.
     pub(crate) fn light_of_faint_groups(&self, from: &Viewpoint) -> Rgb {
         if self.faint.groups.is_empty() {
             return Rgb::ZERO;
         }
-        match self.faint.plane.get_or_init(|| self.plane_of_faint_groups()) {
-            Some(plane) if from.normal == from.up => plane.at(from.position),
-            _ => self.look_at_faint_groups(from),
+        let (_, turn) = self.gather.sampling;
+        if turn != 0 || from.normal != from.up {
+            return self.look_at_faint_groups(from);
         }
+        let plane = self.faint.plane.get_or_init(|| self.plane_of_faint_groups());
+        plane.as_ref().map_or_else(|| self.look_at_faint_groups(from), |plane| plane.at(from.position))
     }
 
     /// The plane through that light at a few places of a small leaf.
@@ -128,5 +130,51 @@ impl LeafGather<'_> {
             exitance / luminance(exitance) * (tree.power(group) * per_area)
         };
         self.faint.groups.iter().enumerate().map(from_group).sum()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use crate::testing::Builder;
+    use crate::{Gather, Shafts, SolveOptions, form_factor_at, solve};
+
+    /// A square from a corner, its front up or down.
+    fn square(corner: DVec3, side: f64, up: bool) -> Vec<DVec3> {
+        let mut outline = [(0., 0.), (1., 0.), (1., 1.), (0., 1.)].map(|(x, y)| corner + DVec3::new(x, y, 0.0) * side);
+        if !up {
+            outline.reverse();
+        }
+        outline.to_vec()
+    }
+
+    /// A small tile under 441 lamps, far above a large floor.
+    #[test]
+    fn light_of_faint_lamps_is_linear_over_a_small_element_and_not_where_it_is_checked() {
+        let lamps: Vec<_> = (0..441).map(|i| DVec3::new(f64::from(i % 21), f64::from(i / 21), 4.0)).collect();
+        let lamps: Vec<_> = lamps.into_iter().map(|corner| square(corner, 0.5, false)).collect();
+        let dark = Builder::default().material(0.0, 0.0).polygon(&square(DVec3::new(10.0, 10.0, 0.0), 0.5, true));
+        let dark = dark.polygon(&square(DVec3::new(-20.0, -20.0, -10.0), 60.0, true));
+        let scene = lamps.iter().fold(dark.material(0.0, 1.0), |scene, lamp| scene.polygon(lamp)).build();
+        let solution = solve(&scene, &SolveOptions::default(), &|_| ());
+        let tile = solution.leaves_of(0)[0];
+        let light = |gather: &Gather<'_>, x: f64| {
+            let leaf = gather.over_emitters(tile, &mut Shafts::default());
+            assert!(leaf.sources.is_empty(), "all are faint");
+            let place = DVec3::new(10.0 + x, 10.2, 0.0);
+            leaf.light_of_faint_groups(&gather.viewpoint(0, place, DVec3::ZERO, Cosine::Own)).x
+        };
+        let bakes = Gather::with_source_error(&scene, &solution, 0.5);
+        let [from, middle, to] = [0.0, 0.25, 0.5].map(|x| light(&bakes, x));
+        assert!((from + to - 2.0 * middle).abs() < 1e-12 * middle);
+        let checks = Gather::with_turned_rays(&scene, &solution, 2.0, 1);
+        let [from, between, to] = [0.0, 0.25, 0.5].map(|x| light(&checks, x));
+        assert!((from + to - 2.0 * between).abs() > 1e-6 * between);
+        let lamp = |lamp: &Vec<DVec3>| form_factor_at(DVec3::new(10.25, 10.2, 0.0), DVec3::Z, lamp).abs() * PI;
+        let exact: f64 = lamps.iter().map(lamp).sum();
+        for found in [middle, between] {
+            assert!((found / exact - 1.0).abs() < 0.15, "{found} in place of {exact}");
+        }
     }
 }
