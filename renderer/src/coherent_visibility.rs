@@ -40,6 +40,9 @@ pub struct Coherence {
     pub floods_finest: bool,
     /// What is done at the borders of objects.
     pub borders: Borders,
+    /// Whether, before a ray is traced, the polygon that hid the light last is asked whether it still does: the same is seen, by
+    /// fewer rays. Not with warping, which must know where the nearest blocker is.
+    pub asks_hiders: bool,
     /// How many of the lights that are brightest on a pixel are doubted at boundaries, whatever the flooding: section 5 of the
     /// paper. Bright lights have small cells, and are what is seen of an error.
     pub brightest: u32,
@@ -54,8 +57,7 @@ pub enum Borders {
     /// A ray to every light, as the paper has it.
     Traced,
     /// It is predicted from those that are, if there are two or more, and boundaries of what is seen are doubted, and what is
-    /// found wrong flooded, whatever is done elsewhere. With it, before a ray is traced, the polygon that hid the light from
-    /// the last pixel is asked whether it still does: the same is seen, by fewer rays.
+    /// found wrong flooded, whatever is done elsewhere.
     Predicted,
 }
 
@@ -101,21 +103,34 @@ impl Visibility {
 }
 
 const fn coherent(order: EvaluationOrder, warps: bool, flooding: Flooding, floods_finest: bool) -> Visibility {
-    let borders = Borders::Traced;
-    Visibility::Coherent(Coherence { order, warps, flooding, floods_finest, borders, brightest: 0, error: 0.0 })
+    Visibility::Coherent(Coherence {
+        order,
+        warps,
+        flooding,
+        floods_finest,
+        borders: Borders::Traced,
+        asks_hiders: false,
+        brightest: 0,
+        error: 0.0,
+    })
 }
 
 const fn predicting_borders(flooding: Flooding, floods_finest: bool) -> Visibility {
-    let (order, borders) = (EvaluationOrder::Grid, Borders::Predicted);
-    Visibility::Coherent(Coherence { order, warps: false, flooding, floods_finest, borders, brightest: 0, error: 0.0 })
+    Visibility::Coherent(Coherence {
+        order: EvaluationOrder::Grid,
+        warps: false,
+        flooding,
+        floods_finest,
+        borders: Borders::Predicted,
+        asks_hiders: true,
+        brightest: 0,
+        error: 0.0,
+    })
 }
 
 /// Pixels of its own object that one at a border is predicted from at least: from a single one hardly fewer rays are traced in
 /// all, and on a plant a quarter more is predicted wrong.
 const FEWEST_AT_BORDERS: usize = 2;
-
-/// In place of a polygon.
-const NONE: u32 = u32::MAX;
 
 /// A pixel that light is asked for at.
 #[derive(Clone, Copy, Debug)]
@@ -212,8 +227,8 @@ struct Search<'a> {
     /// By pixel and light, a point of what hides it, relative to the pixel, metres; not a number where nothing does. Empty
     /// without warping.
     blockers: Vec<Vec3>,
-    /// By light, the polygon that hid it last, [`NONE`] at first. Empty where none is asked before a ray is traced.
-    hiders: Vec<u32>,
+    /// By light, the polygon that hid it last. Empty where none is asked before a ray is traced.
+    hiders: Vec<Option<u32>>,
     words: usize,
     /// Of the pixel at hand: lights above its horizon, those that nothing is predicted of, and those that are traced or will be.
     above: Vec<u64>,
@@ -233,7 +248,7 @@ impl<'a> Search<'a> {
     ) -> Self {
         let (words, pixels) = (words(lights.directions.len()), places.len());
         let warps = matches!(visibility, Visibility::Coherent(Coherence { warps: true, .. }));
-        let asks_hiders = matches!(visibility, Visibility::Coherent(Coherence { borders: Borders::Predicted, .. }));
+        let asks_hiders = matches!(visibility, Visibility::Coherent(Coherence { asks_hiders: true, .. }));
         let set = || vec![0; words];
         Self {
             surfaces,
@@ -243,7 +258,7 @@ impl<'a> Search<'a> {
             places,
             known: BlockVisibility { seen: vec![0; pixels * words], traced: vec![0; pixels], above: vec![0; pixels] },
             blockers: vec![Vec3::NAN; if warps { pixels * lights.directions.len() } else { 0 }],
-            hiders: vec![NONE; if asks_hiders { lights.directions.len() } else { 0 }],
+            hiders: vec![None; if asks_hiders { lights.directions.len() } else { 0 }],
             words,
             above: set(),
             uncertain: set(),
@@ -276,7 +291,7 @@ impl<'a> Search<'a> {
         // As far away as everything is before.
         let way = direction * 2.0 * self.surfaces.size;
         let stands = |id| !self.surfaces.is_on(receiver, id);
-        let hider = self.hiders.get(light as usize).copied().filter(|&hider| hider != NONE && stands(hider));
+        let hider = self.hiders.get(light as usize).copied().flatten().filter(|&hider| stands(hider));
         if hider.is_some_and(|hider| self.surfaces.crosses(hider, &Ray { origin: receiver.position, direction: way })) {
             put(&mut self.known.seen[pixel * self.words..][..self.words], light, false);
             return false;
@@ -284,8 +299,8 @@ impl<'a> Search<'a> {
         self.known.traced[pixel] += 1;
         let is_seen = if self.blockers.is_empty() {
             let hider = self.surfaces.bvh.blocker_among(receiver.position, receiver.position + way, stands);
-            if let (Some(hider), Some(last)) = (hider, self.hiders.get_mut(light as usize)) {
-                *last = hider;
+            if let Some(last) = self.hiders.get_mut(light as usize) {
+                *last = hider.or(*last);
             }
             hider.is_none()
         } else {
