@@ -3,7 +3,7 @@
 use glam::DVec3;
 use rayon::prelude::*;
 use scene::{Rgb, Scene};
-use solver::{Cosine, SMALL_LEAF, Solution, Visibility, principal_axes};
+use solver::{Cosine, PrincipalAxes, SMALL_LEAF, Solution, Visibility};
 
 use crate::{Leaf, Mesh, MeshTriangle, SampleQuery, SampleTable};
 
@@ -37,15 +37,12 @@ enum Told {
     Between([u32; 2]),
 }
 
-/// Light over a small leaf as a plane: through what it is at two places or four, about the middle along the leaf's principal
-/// axes ([`principal_axes`]).
+/// Light over a small leaf as a plane: through what it is at places on the leaf's principal axes.
 #[derive(Clone, Debug, PartialEq)]
 struct LeafPlane {
-    /// The first of its queries; those of an axis follow each other.
+    /// The query at the first of the places; the others follow it.
     first: u32,
-    centre: DVec3,
-    /// One axis, or two: from the middle to the first place.
-    axes: Vec<DVec3>,
+    axes: PrincipalAxes,
 }
 
 impl StandIns {
@@ -101,7 +98,10 @@ impl StandIns {
             Told::Aside(nearer) => look(nearer) * 2.0 - look(nearer + 1),
             Told::Planes([first, end]) => {
                 let around = &self.around[first as usize..end as usize];
-                let light = |&plane: &u32| self.planes[plane as usize].at(query.position, look);
+                let light = |&plane: &u32| {
+                    let LeafPlane { first, axes } = &self.planes[plane as usize];
+                    axes.plane_at(query.position, |place| look(first + place))
+                };
                 around.iter().map(light).sum::<Rgb>() / around.len() as f64
             }
             Told::Between(_) => Rgb::ZERO,
@@ -137,25 +137,13 @@ impl StandIns {
     /// Looks at places within a leaf; the number of its plane. None if it has no extent.
     fn look_within(&mut self, solution: &Solution, leaf: &Leaf) -> Option<u32> {
         let patch = solution.elements.patch_of(leaf.element)?;
-        let (centre, axes) = principal_axes(&leaf.outline, &solution.elements.patches[patch as usize])?;
+        let axes = PrincipalAxes::new(&leaf.outline, &solution.elements.patches[patch as usize])?;
         let first = self.queries.len() as u32;
         let Leaf { polygon, element, .. } = *leaf;
         let query = |position| SampleQuery { position, polygon, element, inward: DVec3::ZERO, cosine: Cosine::Own };
-        self.queries.extend(axes.iter().flat_map(|&axis| [query(centre + axis), query(centre - axis)]));
-        self.planes.push(LeafPlane { first, centre, axes });
+        self.queries.extend(axes.places().map(query));
+        self.planes.push(LeafPlane { first, axes });
         Some(self.planes.len() as u32 - 1)
-    }
-}
-
-impl LeafPlane {
-    /// The light at a position, from that of the queries.
-    fn at(&self, position: DVec3, look: impl Fn(u32) -> Rgb) -> Rgb {
-        let along = |(query, axis): (u32, &DVec3)| {
-            let slope = axis.dot(position - self.centre) / axis.length_squared();
-            let [from, to] = [query, query + 1].map(&look);
-            (from + to) / (2 * self.axes.len()) as f64 + (from - to) * (slope / 2.0)
-        };
-        (self.first..).step_by(2).zip(&self.axes).map(along).sum()
     }
 }
 

@@ -9,7 +9,7 @@ use scene::{Rgb, luminance};
 use crate::backprojection::Viewpoint;
 use crate::lattice::{Fan, STEP, shift};
 use crate::leaf_gather::LeafGather;
-use crate::principal_axes::principal_axes;
+use crate::principal_axes::PrincipalAxes;
 use crate::ray_gather::ASIDE;
 use crate::{Cosine, NodeId};
 
@@ -35,19 +35,16 @@ impl FaintGroups {
     }
 }
 
-/// Irradiance that is linear over an element, W·m⁻².
+/// Irradiance that is taken for linear over an element, W·m⁻²: by what it is at places on its axes.
 #[derive(Clone)]
 struct LightPlane {
-    centre: DVec3,
-    mean: Rgb,
-    /// Directions in the element's plane, m⁻¹, each with the light that is added per unit of their product with a place.
-    slopes: Vec<(DVec3, Rgb)>,
+    axes: PrincipalAxes,
+    looked: Vec<Rgb>,
 }
 
 impl LightPlane {
     fn at(&self, position: DVec3) -> Rgb {
-        let added = |&(way, slope): &(DVec3, Rgb)| slope * way.dot(position - self.centre);
-        (self.mean + self.slopes.iter().map(added).sum::<Rgb>()).max(Rgb::ZERO)
+        self.axes.plane_at(position, |place| self.looked[place as usize]).max(Rgb::ZERO)
     }
 }
 
@@ -94,15 +91,10 @@ impl LeafGather<'_> {
             return None;
         }
         let patch = &elements.patches[elements.patch_of(element)? as usize];
-        let (centre, axes) = principal_axes(elements.outline(element), patch)?;
+        let axes = PrincipalAxes::new(elements.outline(element), patch)?;
         let light = |place| self.look_at_faint_groups(&gather.viewpoint(self.polygon, place, DVec3::ZERO, Cosine::Own));
-        let (mut sum, mut slopes) = (Rgb::ZERO, Vec::new());
-        for &axis in &axes {
-            let ends = [light(centre + axis), light(centre - axis)];
-            sum += ends[0] + ends[1];
-            slopes.push((axis / axis.length_squared(), (ends[0] - ends[1]) / 2.0));
-        }
-        Some(LightPlane { centre, mean: sum / (2 * axes.len()) as f64, slopes })
+        let looked = axes.places().map(light).collect();
+        Some(LightPlane { axes, looked })
     }
 
     /// The same at a point: one place of each group is tried.

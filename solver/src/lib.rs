@@ -48,7 +48,7 @@ pub use lattice::{Fan, hemisphere, spread};
 pub use leaf_gather::{DirectIrradiance, LeafGather, SeenNode};
 pub use linear_fit::colour_slope;
 pub use openings::{Openings, SeenCell};
-pub use principal_axes::principal_axes;
+pub use principal_axes::PrincipalAxes;
 pub use ray_gather::SMALL_LEAF;
 pub use shafts::Shafts;
 pub use sky_cells::{SkyCell, SkyCells};

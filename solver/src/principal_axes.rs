@@ -1,17 +1,45 @@
-//! The principal axes of a convex outline: where to look at light that is to be taken for linear over it.
+//! The principal axes of a convex outline, and light that is taken for linear over it: by what it is at places on them.
 
 use glam::{DVec2, DVec3};
+use scene::Rgb;
 
 use crate::Patch;
 
 /// Width of an outline, as a part of its length, below which light is taken for the same all across it.
 const NARROW: f64 = 0.25;
 
-/// The middle of a convex outline in a patch's plane, and its principal axes, as long as the root mean square of what lies
-/// along them, metres; the longer one alone if it is narrow. None without an area.
-///
-/// The places at plus and minus an axis are those of Gauss' rule of two points over a rectangle, and lie within any convex outline.
-pub fn principal_axes(outline: &[DVec3], patch: &Patch) -> Option<(DVec3, Vec<DVec3>)> {
+/// The middle of a convex outline, and its principal axes.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PrincipalAxes {
+    centre: DVec3,
+    /// As long as the root mean square of what lies along them, metres: two, or the longer one alone if the outline is narrow.
+    axes: Vec<DVec3>,
+}
+
+impl PrincipalAxes {
+    /// Those of an outline in a patch's plane; none without an area.
+    pub fn new(outline: &[DVec3], patch: &Patch) -> Option<Self> {
+        let (centre, axes) = principal_axes(outline, patch)?;
+        Some(Self { centre, axes })
+    }
+
+    /// Two places on each axis: those of Gauss' rule of two points over a rectangle. They lie within the outline.
+    pub fn places(&self) -> impl Iterator<Item = DVec3> {
+        self.axes.iter().flat_map(|&axis| [self.centre + axis, self.centre - axis])
+    }
+
+    /// The plane through what light is at the places, at a position; `light` is asked by the place's number.
+    pub fn plane_at(&self, position: DVec3, light: impl Fn(u32) -> Rgb) -> Rgb {
+        let along = |(first, axis): (u32, &DVec3)| {
+            let slope = axis.dot(position - self.centre) / axis.length_squared();
+            let [ahead, behind] = [light(first), light(first + 1)];
+            (ahead + behind) / (2 * self.axes.len()) as f64 + (ahead - behind) * (slope / 2.0)
+        };
+        (0..).step_by(2).zip(&self.axes).map(along).sum()
+    }
+}
+
+fn principal_axes(outline: &[DVec3], patch: &Patch) -> Option<(DVec3, Vec<DVec3>)> {
     let corners: Vec<DVec2> = outline.iter().map(|&corner| patch.along(corner - outline[0])).collect();
     let (mut area, mut first, mut second) = (0.0, DVec2::ZERO, [0.0; 3]);
     for edge in corners.get(1..)?.windows(2) {
@@ -81,12 +109,18 @@ mod tests {
             angles.sort_by(f64::total_cmp);
             let outline: Vec<DVec3> =
                 angles.iter().map(|angle| DVec3::new(angle.cos(), angle.sin() * squeeze, 2.0)).collect();
-            let Some((centre, axes)) = principal_axes(&outline, &patch()) else { return Ok(()) };
-            for place in axes.iter().flat_map(|&axis| [centre + axis, centre - axis]) {
+            let Some(axes) = PrincipalAxes::new(&outline, &patch()) else { return Ok(()) };
+            for place in axes.places() {
                 for (i, &corner) in outline.iter().enumerate() {
                     let edge = outline[(i + 1) % outline.len()] - corner;
                     prop_assert!(edge.cross(place - corner).z > -1e-9);
                 }
+            }
+            if axes.axes.len() == 2 {
+                let light = |place: DVec3| Rgb::new(1.0, 2.0, 3.0) * (4.0 + place.x - 2.0 * place.y);
+                let looked: Vec<Rgb> = axes.places().map(light).collect();
+                let found = axes.plane_at(outline[0], |place| looked[place as usize]);
+                prop_assert!((found - light(outline[0])).length() < 1e-9);
             }
         }
     }
