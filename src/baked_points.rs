@@ -1,13 +1,13 @@
-//! Points of a bake's surfaces: where on its mesh they lie.
+//! The light of a bake at points of its surfaces.
 
 use renderer::SurfacePoint;
-use scene::{Baked, Bvh};
+use scene::{Baked, Bvh, Rgb};
 
 /// How far a point of a surface may lie from the triangle of the mesh that stands for it, as a fraction of the scene's size: the
 /// mesh has positions in f32.
 const REACH: f64 = 1e-6;
 
-/// Finds triangles of a bake.
+/// A bake, and what finds its triangles.
 pub struct BakedPoints<'a> {
     baked: &'a Baked,
     mesh: Bvh,
@@ -21,8 +21,17 @@ impl<'a> BakedPoints<'a> {
         Self { baked, mesh: baked.bvh(), reach: REACH * baked.scene.size() }
     }
 
-    /// The triangle that a point lies on, and its barycentrics (s, t) there; none where the mesh has no triangle.
-    pub fn locate(&self, point: &SurfacePoint) -> Option<(u32, f64, f64)> {
+    /// Irradiance, W·m⁻²; nothing where the mesh has no triangle.
+    pub fn irradiance(&self, point: &SurfacePoint) -> Rgb {
+        self.locate(point).map_or(Rgb::ZERO, |(triangle, s, t)| self.baked.irradiance(triangle, s, t))
+    }
+
+    /// The part of it that does not come straight from the scene's environment.
+    pub fn irradiance_from_surfaces(&self, point: &SurfacePoint) -> Rgb {
+        self.locate(point).map_or(Rgb::ZERO, |(triangle, s, t)| self.baked.irradiance_from_surfaces(triangle, s, t))
+    }
+
+    fn locate(&self, point: &SurfacePoint) -> Option<(u32, f64, f64)> {
         self.baked.locate(&self.mesh, point.position, point.normal, self.reach)
     }
 }

@@ -8,7 +8,7 @@ use renderer::{
     Evaluator, Eye, PathLight, PathOptions, SurfacePoint, VisibleLine, Whitted, object_edges, reflected_lines,
     visible_lines,
 };
-use scene::{Baked, Bvh, Camera, DiscontinuityLine, Provenance, Rgb, Scene};
+use scene::{Baked, Bvh, Camera, DiscontinuityLine, Provenance, Scene};
 use solver::{Gather, Solution};
 
 use crate::args::{LightFlags, RadianceChoice, RadianceFlags, RenderFlags};
@@ -143,12 +143,9 @@ pub fn with_evaluator_of<T>(
 
 fn by_interpolants<T>(baked: &Baked, view: &View, work: impl FnOnce(&Evaluator<'_>) -> T) -> T {
     let points = BakedPoints::new(baked);
-    let irradiance = |point: &SurfacePoint| {
-        points.locate(point).map_or(Rgb::ZERO, |(triangle, s, t)| baked.irradiance(triangle, s, t))
-    };
     let bvh = Bvh::of_scene(&baked.scene);
     let eye = view.eye(&baked.scene, &bvh);
-    work(&|point| eye.diffuse(point, |seen| (irradiance(seen), 0)))
+    work(&|point| eye.diffuse(point, |seen| (points.irradiance(seen), 0)))
 }
 
 fn by_gather<T>(scene: &Scene, solution: &Solution, view: &View, work: impl FnOnce(&Evaluator<'_>) -> T) -> T {

@@ -48,13 +48,11 @@ pub fn run(flags: &RenderFlags, source: &SkySource, outputs: &Outputs) -> Result
         Input::Scene(scene) => (scene, None),
         Input::Baked(baked) => {
             warn_of_another_sky(flags, baked, &environment);
-            (&baked.scene, Some((baked, BakedPoints::new(baked))))
+            (&baked.scene, Some(BakedPoints::new(baked)))
         }
     };
-    let elsewhere = |point: &SurfacePoint| {
-        let found = bounce.as_ref().and_then(|(baked, points)| Some((baked, points.locate(point)?)));
-        found.map_or(Rgb::ZERO, |(baked, (triangle, s, t))| baked.irradiance_from_surfaces(triangle, s, t))
-    };
+    let elsewhere =
+        |point: &SurfacePoint| bounce.as_ref().map_or(Rgb::ZERO, |points| points.irradiance_from_surfaces(point));
     let camera = camera(&viewpoint, scene)?;
     let stage = Stage::start("lights");
     let lights = EnvironmentLights::new(&environment, sky.lights, sky.sky_sampling.into());

@@ -75,16 +75,14 @@ impl FineMesh {
         let (samples, shaded) = fine.table.shaded(scene);
         known.find(&gather, queries.iter().chain(&shaded).chain(&probes), inquiry);
         known.shafts.retain(|&element, _| solution.elements.is_leaf(element));
+        let shown = |mut own: Vec<Rgb>, by_shading: Vec<Rgb>| {
+            samples.iter().zip(by_shading).for_each(|(&sample, light)| own[sample] = light);
+            own
+        };
         fine.emitted = known.at(solution, &queries, inquiry);
-        fine.shown = fine.emitted.clone();
-        for (&sample, light) in samples.iter().zip(known.at(solution, &shaded, inquiry)) {
-            fine.shown[sample] = light;
-        }
+        fine.shown = shown(fine.emitted.clone(), known.at(solution, &shaded, inquiry));
         if inquiry.has_sky() {
-            fine.shown_sky = known.sky_at(&queries, inquiry);
-            for (&sample, light) in samples.iter().zip(known.sky_at(&shaded, inquiry)) {
-                fine.shown_sky[sample] = light;
-            }
+            fine.shown_sky = shown(known.sky_at(&queries, inquiry), known.sky_at(&shaded, inquiry));
         }
         fine.probed = known.at(solution, &probes, inquiry);
         fine

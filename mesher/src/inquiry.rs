@@ -52,10 +52,10 @@ impl<'a> Inquiry<'a> {
         let of_sky = if has_sky { answers.emitted.len() } else { 0 };
         let answers = if answers.sky.len() == of_sky { answers } else { Answers::default() };
         Self {
-            has_sky,
             control,
             forecast: Forecast::new(control, solution.visibility == Visibility::Rays, solution.reflects()),
             answers,
+            has_sky,
             asked: 0,
             emitted: 0,
             rows: 0,
@@ -115,8 +115,8 @@ impl<'a> Inquiry<'a> {
         &self.answers.rows[number as usize]
     }
 
-    /// The light of emitters and of the sky at the first of the queries: all, unless the bake is stopped. `answer` finds it for queries of one
-    /// element.
+    /// The light of emitters and of the sky at the first of the queries: all, unless the bake is stopped. `answer` finds it for
+    /// queries of one element.
     pub fn emitted(
         &mut self,
         queries: &[&SampleQuery],
