@@ -21,6 +21,9 @@ const SIZES: [u32; 4] = [1_000, 4_000, 16_000, 64_000];
 /// The error that is asked for: what nobody sees in a hall.
 const TOLERANCE: &str = "0.05";
 
+/// No second round is begun after so long: large halls would take several for the last of the error.
+const SECONDS: &str = "15";
+
 /// Points at which a bake is held against paths.
 const POINTS: &str = "1000";
 
@@ -31,7 +34,7 @@ fn main() {
     println!("{}", machine());
     println!("Command: `cargo bench --bench growth`, {}.\n", env!("CARGO_PKG_VERSION"));
     println!(
-        "`bake --tolerance {TOLERANCE}` of `hall` in benches/common/generated, one run each; rows are points at which"
+        "`bake --tolerance {TOLERANCE} --max-seconds {SECONDS}` of `hall` in benches/common/generated, one run each; rows are points at which"
     );
     println!("reflectors were looked at, entries of memory by far the most. Measured by `verify --points {POINTS}`.\n");
     println!("| polygons | seconds | MB | triangles | rows | rounds | claimed rms | measured rms |");
@@ -45,7 +48,8 @@ fn main() {
         let polygons = scene.polygons.len() as f64;
         let text = |path: &Path| path.to_str().unwrap().to_owned();
         let start = Instant::now();
-        let bake = ["bake", &text(&model), "-o", &text(&output), "--tolerance", TOLERANCE, "--json"];
+        let bake =
+            ["bake", &text(&model), "-o", &text(&output), "--tolerance", TOLERANCE, "--max-seconds", SECONDS, "--json"];
         let report: Value = serde_json::from_slice(&halflight(&bake).stdout).unwrap();
         let seconds = start.elapsed().as_secs_f64();
         let verify = ["verify", &text(&output), "--points", POINTS, "--json"];

@@ -10,7 +10,7 @@ use viewer::{Update, Walkthrough, WindowSystem};
 use crate::desktop::{Desktop, Window};
 use crate::fixture::{cornell_box, data, folder, office, probe, run, text, write_points};
 
-/// The share of pixels in which a picture on the screen may differ by more than 1/255: those on edges, by the camera's digits.
+/// The share of pixels in which a picture on the screen may differ by more than 1/255: those on edges.
 const SHARE: f64 = 2e-3;
 
 /// The picture that `shot` draws with some flags.
