@@ -8,6 +8,9 @@ use crate::sequence::{Kronecker, Stream};
 /// Several f64 roundings of a point, as a fraction of the scene's size: a point this near to a plane is in it.
 const ROUNDING: f64 = 1e-12;
 
+/// The sine of the angle up to which two planes are parallel, above the rounding of their normals.
+const PARALLEL: f64 = 1e-9;
+
 /// How far, as a fraction of the scene's size, a given point may be from a polygon that it is meant to lie on: files
 /// often carry seven digits. A point farther off is taken as one in empty space.
 const REACH: f64 = 1e-6;
@@ -93,9 +96,17 @@ impl<'a> Surfaces<'a> {
         Receiver { cosine, ..(*point).into() }
     }
 
-    /// Whether a receiver lies on a polygon or on the other side of it.
+    /// Whether a receiver lies on a polygon, on the other side of it, or in its very plane.
     pub fn is_on(&self, receiver: &Receiver, polygon: u32) -> bool {
-        receiver.polygon.is_some_and(|own| self.is_same_surface(own, polygon))
+        receiver.polygon.is_some_and(|own| self.is_same_surface(own, polygon)) || self.is_in_plane(receiver, polygon)
+    }
+
+    /// Whether a receiver's plane is that of a polygon, as where two faces lie against each other. What lies in the plane takes up
+    /// nothing of what is above it, and whether a ray would meet it is up to rounding.
+    fn is_in_plane(&self, receiver: &Receiver, polygon: u32) -> bool {
+        let plane = self.plane(polygon);
+        plane.distance(receiver.position).abs() <= self.rounding
+            && plane.normal.cross(receiver.normal).length_squared() <= PARALLEL * PARALLEL
     }
 
     fn is_same_surface(&self, a: u32, b: u32) -> bool {
@@ -216,6 +227,8 @@ pub fn spread_by_area(
 
 #[cfg(test)]
 mod tests {
+    use glam::DQuat;
+
     use super::*;
     use crate::path_trace::test_scenes::{black, scene_of};
 
@@ -257,6 +270,28 @@ mod tests {
         assert_eq!(surfaces.receiver_at(DVec3::new(0.5, 0.5, 0.1234568), -DVec3::Z).polygon, None);
         assert_eq!(surfaces.receiver_at(DVec3::new(0.5, 0.5, 0.1235), DVec3::Z).polygon, None);
         assert_eq!(surfaces.receiver_at(DVec3::new(1.5, 0.5, 0.1234568), DVec3::Z).polygon, None);
+    }
+
+    /// A box stands on a tilted floor in whose plane its bottom lies. A point of the floor below it sees the lid, whatever the
+    /// direction: whether a ray met the bottom would be a matter of rounding.
+    #[test]
+    fn what_lies_in_the_plane_of_a_point_hides_nothing_from_it() {
+        let tilt = DQuat::from_rotation_x(0.3) * DQuat::from_rotation_y(0.2);
+        let tilted = |outline: &[DVec3]| outline.iter().map(|&corner| tilt * corner).collect::<Vec<_>>();
+        let underside = |z| tilted(&square(z).into_iter().rev().collect::<Vec<_>>());
+        let floor = tilted(&square(0.1).iter().map(|corner| corner * 3.0).collect::<Vec<_>>());
+        let scene = scene_of(&[(floor, black()), (underside(0.3), black()), (underside(9.0), black())]);
+        let bvh = Bvh::of_scene(&scene);
+        let surfaces = Surfaces::new(&scene, &bvh);
+        for point in spread_by_area(&scene, 300, 0.1, 1, |polygon| polygon == 1) {
+            let point = SurfacePoint { normal: -point.normal, polygon: 0, ..point };
+            let floor = surfaces.looked_at(&point);
+            let lid = surfaces.seen_from(&floor, point.normal);
+            assert!(matches!(lid, Seen::Front(lid) if lid.polygon == 2), "{point:?}: {lid:?}");
+            // From a little below, the bottom is what is seen.
+            let below = Receiver { position: point.position - point.normal * 1e-6, ..floor };
+            assert!(matches!(surfaces.seen_from(&below, point.normal), Seen::Front(seen) if seen.polygon == 1));
+        }
     }
 
     #[test]

@@ -8,7 +8,7 @@ use scene::{Rgb, luminance};
 
 use crate::backprojection::Viewpoint;
 use crate::lattice::{Fan, STEP, shift};
-use crate::leaf_gather::LeafGather;
+use crate::leaf_gather::{LeafGather, Source};
 use crate::principal_axes::PrincipalAxes;
 use crate::ray_gather::ASIDE;
 use crate::{Cosine, NodeId};
@@ -18,6 +18,10 @@ const SCATTER: f64 = 0.2;
 
 /// Rays to one emitter at most.
 const MOST_RAYS: f64 = 25.0;
+
+/// Obstacles before an emitter that are projected one by one in any case; more are where it would take as many rays. Less leaves to
+/// rays penumbrae that exact ones would be had for.
+const OBSTACLES: f64 = 24.0;
 
 /// Groups of emitters that are faint at an element, in a scene without links.
 #[derive(Clone, Default)]
@@ -49,6 +53,20 @@ impl LightPlane {
 }
 
 impl LeafGather<'_> {
+    /// Whether rays tell what is seen of an emitter that sends so much to a point if nothing hides it, luminance, W·m⁻²: where that
+    /// is not worth a look at so many obstacles, or they are not known.
+    pub(crate) fn is_seen_by_rays(&self, emitter: &Source, obstacles: usize, unoccluded: f64) -> bool {
+        let is_too_much = obstacles as f64 > self.rays_wanted(unoccluded).max(OBSTACLES);
+        emitter.blockers.is_none() || is_too_much || (obstacles > 0 && unoccluded <= self.gather.budget())
+    }
+
+    /// How many rays it takes to tell what arrives of so much light, luminance, W·m⁻².
+    fn rays_wanted(&self, unoccluded: f64) -> f64 {
+        // What rays that are spread evenly are off by falls with their number to the power of −3/4.
+        let relative = unoccluded / self.gather.budget().max(f64::MIN_POSITIVE);
+        (relative / (2.0 * SCATTER)).powf(4.0 / 3.0)
+    }
+
     /// The share of what an outline sends to a point that arrives there, by rays to points spread evenly over it; `unoccluded`
     /// is all that it sends, luminance, W·m⁻², and decides how many.
     pub(crate) fn seen_share(
@@ -60,9 +78,7 @@ impl LeafGather<'_> {
     ) -> f64 {
         let gather = self.gather;
         let origin = from.aside(ASIDE * gather.geometry.size);
-        // What rays that are spread evenly are off by falls with their number to the power of −3/4.
-        let relative = unoccluded / gather.budget().max(f64::MIN_POSITIVE);
-        let rays = (relative / (2.0 * SCATTER)).powf(4.0 / 3.0).ceil().clamp(1.0, MOST_RAYS) as u32;
+        let rays = self.rays_wanted(unoccluded).ceil().clamp(1.0, MOST_RAYS) as u32;
         let passes = |polygon| passes(polygon) || !origin.may_meet(gather.geometry.outline(polygon));
         let is_blocked = |place| gather.tree.is_blocked(self.polygon, origin.position, place, passes);
         Fan::new(outline).arriving(&origin, (shift(from.position, 0), rays), is_blocked).share
@@ -168,5 +184,27 @@ mod tests {
         for found in [middle, between] {
             assert!((found / exact - 1.0).abs() < 0.15, "{found} in place of {exact}");
         }
+    }
+
+    /// 49 plates before a lamp, side by side, of 449 polygons: where the lamp is worth as many rays, what is left of it is exact.
+    #[test]
+    fn what_many_obstacles_hide_of_a_strong_lamp_is_exact() {
+        let grid = |count: i32, step: f64, z: f64| {
+            (0..count * count).map(move |i| DVec3::new(f64::from(i % count) * step, f64::from(i / count) * step, z))
+        };
+        let plates: Vec<_> = grid(7, 0.1, 2.0).map(|corner| square(corner + DVec3::splat(0.01), 0.05, true)).collect();
+        let lamp = square(DVec3::new(-0.1, -0.1, 2.1), 0.9, false);
+        let floor = square(DVec3::new(-1.0, -1.0, 0.0), 3.0, true);
+        let apart = grid(20, 0.5, -9.0).map(|corner| square(corner, 0.4, true));
+        let dark = Builder::default().material(0.0, 0.0).polygon(&floor);
+        let dark = plates.iter().cloned().chain(apart).fold(dark, |scene, outline| scene.polygon(&outline));
+        let scene = dark.material(0.0, 1.0).polygon(&lamp).build();
+        let solution = solve(&scene, &SolveOptions::default(), &|_| ());
+        let gather = Gather::with_source_error(&scene, &solution, 1e-3);
+        let place = DVec3::new(0.3, 0.2, 0.0);
+        let seen = |outline: &Vec<DVec3>| form_factor_at(place, DVec3::Z, outline).abs() * PI;
+        let exact = seen(&lamp) - plates.iter().map(seen).sum::<f64>();
+        let light = gather.irradiance_at(0, place, DVec3::ZERO).x;
+        assert!((light / exact - 1.0).abs() < 1e-9, "{light} in place of {exact}");
     }
 }

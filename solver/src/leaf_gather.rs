@@ -31,10 +31,6 @@ const WHOLE: f64 = 1.0 - 1e-9;
 /// all angles that matter. Less opens fewer nodes.
 const CURVATURE: f64 = 2.0;
 
-/// Obstacles before a source at most that are projected one by one, in a scene of too many polygons for links; past more,
-/// rays tell what is seen of it. Less leaves penumbrae to rays that exact ones would be had for.
-const MOST_OBSTACLES: usize = 24;
-
 /// Six points that integrate a polynomial of degree 4 over a triangle: weights, and barycentrics of which the second counts
 /// twice (Dunavant, "High Degree Efficient Symmetrical Gaussian Quadrature Rules for the Triangle", 1985). A point a
 /// triangle leaves nodes too dark by a fifth of a percent a bounce: what a point sees of a near node is mostly its near side.
@@ -222,12 +218,12 @@ impl LeafGather<'_> {
         };
         fragments.start(cone.corners(), from);
         let obstacles = source.before.get_or_init(|| self.before(&self.plane(source), source.blockers()));
-        if source.blockers.is_none() || obstacles.len() > MOST_OBSTACLES {
-            let unoccluded = fragments.measure(from.normal);
+        let unoccluded = fragments.measure(from.normal);
+        let irradiance = luminance(unoccluded * self.gather.scene.material(source.polygon).exitance());
+        if self.is_seen_by_rays(source, obstacles.len(), irradiance) {
             let distance = emitter.body[0].distance(from.position);
             let outline: Vec<DVec3> = cone.corners().iter().map(|corner| from.position + corner * distance).collect();
             let passes = |polygon: u32| emitter.polygons.binary_search(&polygon).is_ok();
-            let irradiance = luminance(unoccluded * self.gather.scene.material(source.polygon).exitance());
             return unoccluded * self.seen_share(&outline, irradiance, from, passes);
         }
         for obstacle in obstacles {
@@ -315,11 +311,11 @@ impl LeafGather<'_> {
                 continue;
             }
             let obstacles = source.before.get_or_init(|| self.before(&self.plane(source), source.blockers()));
-            let by_rays = source.blockers.is_none();
-            if (by_rays || !obstacles.is_empty()) && !touches && gather.emitter_tree().is_some() {
+            let is_open = source.blockers.is_some() && obstacles.is_empty();
+            if !is_open && !touches && gather.emitter_tree().is_some() {
                 let unoccluded = fragments.measure(from.normal);
                 let irradiance = luminance(unoccluded * material.exitance());
-                if by_rays || irradiance <= gather.budget() || obstacles.len() > MOST_OBSTACLES {
+                if self.is_seen_by_rays(source, obstacles.len(), irradiance) {
                     let share = self.seen_share(outline, irradiance, &from, |polygon| polygon == source.polygon);
                     total += share * unoccluded * material.exitance();
                     continue;
