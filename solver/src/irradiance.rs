@@ -257,7 +257,7 @@ impl<'a> Gather<'a> {
             Some(_) => {
                 let elements = &self.solution.elements;
                 let polygon = elements.polygon_of(element).unwrap_or_default();
-                let view = |rays: &RayGather| rays.over(self.solution, element, &self.horizon(polygon));
+                let view = |rays: &RayGather| rays.over(self.solution, element);
                 LeafGather {
                     gather: self,
                     polygon,

@@ -81,7 +81,7 @@ impl LeafGather<'_> {
         let rays = self.rays_wanted(unoccluded).ceil().clamp(1.0, MOST_RAYS) as u32;
         let passes = |polygon| passes(polygon) || !origin.may_meet(gather.geometry.outline(polygon));
         let is_blocked = |place| gather.tree.is_blocked(self.polygon, origin.position, place, passes);
-        Fan::new(outline).arriving(&origin, (shift(from.position, 0), rays), is_blocked).share
+        Fan::new(outline).arriving_share(&origin, (shift(from.position, 0), rays), is_blocked)
     }
 
     /// Light from the groups of emitters that are faint at the leaf, W·m⁻². Over a small leaf it is linear, but where it is looked at by
