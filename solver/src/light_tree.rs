@@ -1,4 +1,4 @@
-//! A hierarchy over lights, be they emitters or reflectors: those that are far away, faint or turned away are told from the
+//! A hierarchy over emitters: those that are far away, faint or turned away are told from the
 //! others together (Walter et al., "Lightcuts: A Scalable Approach to Illumination", 2005).
 //!
 //! A hall has lamps by the thousand, of which a point sees a dozen well. What decides which is a bound, not a guess: no point of
