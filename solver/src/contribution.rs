@@ -7,7 +7,6 @@ use scene::{Rgb, luminance};
 
 use crate::lamp_rays::FaintGroups;
 use crate::leaf_gather::{LeafGather, SeenNode, Source};
-use crate::ray_gather::View;
 use crate::sky_view::SkyView;
 use crate::{Cosine, Gather};
 
@@ -52,8 +51,8 @@ impl Gather<'_> {
         let mut found: BTreeMap<Sender, Contribution> = BTreeMap::new();
         let LeafGather { gather, polygon, centre, .. } = leaf;
         let emitted_by = |sources: Vec<Source>, faint: FaintGroups, sky: SkyView| {
-            let (view, blockers) = (View::default(), leaf.blockers.clone());
-            let alone = LeafGather { gather, polygon, centre, sources, faint, view, sky, blockers };
+            let blockers = leaf.blockers.clone();
+            let alone = LeafGather { gather, polygon, centre, sources, faint, rays: 0, sky, blockers };
             alone.emitted(position, inward, Cosine::Shading).total()
         };
         for source in &leaf.sources {

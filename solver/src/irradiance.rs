@@ -21,7 +21,7 @@ use crate::lamp_rays::FaintGroups;
 use crate::leaf_gather::{LeafGather, SeenNode, Source};
 use crate::light_tree::{Horizon, LightTree};
 use crate::polygon_tree::PolygonTree;
-use crate::ray_gather::{RayGather, SMALL_LEAF, View, rays_for};
+use crate::ray_gather::{RayGather, SMALL_LEAF, rays_for};
 use crate::shafts::Shafts;
 use crate::sky_view::SkyView;
 use crate::solid::Solids;
@@ -245,7 +245,7 @@ impl<'a> Gather<'a> {
         match self.emitter_tree {
             Some(_) => {
                 let emitters = self.over_shafts(element, &mut Shafts::default());
-                LeafGather { view: self.over_reflectors(element).view, ..emitters }
+                LeafGather { rays: self.rays_over(element), ..emitters }
             }
             None => self.over_sources(element, |_| true),
         }
@@ -257,20 +257,24 @@ impl<'a> Gather<'a> {
             Some(_) => {
                 let elements = &self.solution.elements;
                 let polygon = elements.polygon_of(element).unwrap_or_default();
-                let view = |rays: &RayGather| rays.over(self.solution, element);
                 LeafGather {
                     gather: self,
                     polygon,
                     centre: elements.nodes[element as usize].centre,
                     sources: Vec::new(),
                     faint: FaintGroups::default(),
-                    view: self.rays().map(view).unwrap_or_default(),
+                    rays: self.rays_over(element),
                     sky: SkyView::default(),
                     blockers: Vec::new(),
                 }
             }
             None => self.over_sources(element, |_| true),
         }
+    }
+
+    /// Rays from each point of an element to reflectors: none with links.
+    fn rays_over(&self, element: NodeId) -> u32 {
+        self.rays().map_or(0, |rays| rays.rays_over(self.solution, element))
     }
 
     /// How much light, luminance, W·m⁻², the plane over a reflector's node misplaces at a point with the given form factor to
@@ -365,7 +369,7 @@ impl<'a> Gather<'a> {
             centre,
             sources,
             faint: FaintGroups::default(),
-            view: View::default(),
+            rays: 0,
             sky: SkyView::default(),
             blockers,
         }

@@ -20,7 +20,6 @@ use crate::clip::clip_convex;
 use crate::emitter::outline_of;
 use crate::form_factor::point_form_factor;
 use crate::lamp_rays::FaintGroups;
-use crate::ray_gather::View;
 use crate::sky_view::SkyView;
 use crate::{Cosine, Gather, NodeId};
 
@@ -47,8 +46,8 @@ pub struct LeafGather<'a> {
     pub(crate) centre: DVec3,
     pub(crate) sources: Vec<Source>,
     pub(crate) faint: FaintGroups,
-    /// How its points look at reflectors, in a scene without links.
-    pub(crate) view: View,
+    /// Rays that each of its points looks at reflectors with, in a scene without links.
+    pub(crate) rays: u32,
     /// What its points may see of the sky.
     pub(crate) sky: SkyView,
     /// All blockers of all sources, ascending.
@@ -165,7 +164,7 @@ impl LeafGather<'_> {
             }
             Some(rays) => {
                 let from = self.gather.viewpoint(self.polygon, position, inward, cosine);
-                rays.seen_nodes(self.gather.solution, &self.view, &from, seen);
+                rays.seen_nodes(self.gather.solution, (self.polygon, self.rays), &from, seen);
             }
         }
     }

@@ -36,15 +36,6 @@ const FEW_RAYS: f64 = 0.25;
 /// the rounding of rays, below anything that light tells apart.
 pub(crate) const ASIDE: f64 = 1e-7;
 
-/// How the points of one element look at reflectors.
-#[derive(Default)]
-pub(crate) struct View {
-    /// The element's polygon.
-    polygon: u32,
-    /// Rays over the hemisphere from each point.
-    rays: u32,
-}
-
 /// Sends rays into a solved scene.
 pub(crate) struct RayGather {
     bvh: Bvh,
@@ -90,32 +81,32 @@ impl RayGather {
         }
     }
 
-    /// How the points of an element look at reflectors.
-    pub fn over(&self, solution: &Solution, element: NodeId) -> View {
-        View {
-            polygon: solution.elements.polygon_of(element).unwrap_or_default(),
-            rays: self.rays_over(solution, element),
-        }
-    }
-
-    fn rays_over(&self, solution: &Solution, element: NodeId) -> u32 {
+    /// Rays from each point of an element, at least one.
+    pub fn rays_over(&self, solution: &Solution, element: NodeId) -> u32 {
         let part = (solution.elements.nodes[element as usize].area / self.ample).sqrt();
         ((f64::from(self.rays) * part.clamp(FEW_RAYS, 1.0)) as u32).max(1)
     }
 
-    /// Appends the nodes of reflectors that a point sees; ascending, each once. It is taken to be just in front of all that touches it.
-    pub fn seen_nodes(&self, solution: &Solution, view: &View, point: &Viewpoint, seen: &mut Vec<SeenNode>) {
+    /// Appends the nodes of reflectors that a point of a polygon sees by so many rays; ascending, each once. The point is taken to be
+    /// just in front of all that touches it.
+    pub fn seen_nodes(
+        &self,
+        solution: &Solution,
+        (polygon, rays): (u32, u32),
+        point: &Viewpoint,
+        seen: &mut Vec<SeenNode>,
+    ) {
         let elements = &solution.elements;
         let first = seen.len();
-        let share = 1.0 / f64::from(view.rays);
+        let share = 1.0 / f64::from(rays);
         let from = point.aside(ASIDE * self.size);
         let Viewpoint { position, up, normal, .. } = from;
         let shift = shift(point.position, self.turn);
         // About a shading normal some look below the polygon's plane, where nothing is seen.
-        for direction in hemisphere(normal, view.rays, shift).filter(|way| normal == up || up.dot(*way) > 0.0) {
+        for direction in hemisphere(normal, rays, shift).filter(|way| normal == up || up.dot(*way) > 0.0) {
             let meets = |triangle: u32| {
                 let Patch { polygon: met, root, .. } = elements.patches[self.patches[triangle as usize] as usize];
-                !self.is_own(view.polygon, met)
+                !self.is_own(polygon, met)
                     && from.may_meet(elements.outline(root))
                     && (self.other_sides[met as usize].is_none() || self.normals[met as usize].dot(direction) < 0.0)
             };
@@ -231,13 +222,13 @@ mod tests {
         let solution = solve(&room, &SolveOptions { link_error: Some(0.1), bounces: None }, &|_| ());
         let gather = RayGather::new(&room, &solution, 256, 1e-3, 0);
         let floor = solution.patch_roots(4).next().expect("the floor is a patch");
-        let view = gather.over(&solution, floor);
+        let looks = (4, gather.rays_over(&solution, floor));
         let (mut sums, mut turned_sums) = (Vec::new(), Vec::new());
         for i in 0..40 {
             let position = DVec3::new(0.1 + 0.094 * f64::from(i), 0.2 + f64::from(i * 7 % 40) * 0.065, 0.0);
             let mut seen = Vec::new();
             let point = Viewpoint::flat(position, DVec3::Z, DVec3::ZERO);
-            gather.seen_nodes(&solution, &view, &point, &mut seen);
+            gather.seen_nodes(&solution, looks, &point, &mut seen);
             let sum: f64 = seen.iter().map(|seen| seen.form_factor).sum();
             sums.push(sum - 1.0);
             // About a shading normal the part below the plane is missing: (1 + cos θ)/2 is left.
@@ -245,7 +236,7 @@ mod tests {
             let (y, x) = f64::from(i).sin_cos();
             let turned = Viewpoint { normal: DVec3::new(sin * x, sin * y, cos), ..point };
             seen.clear();
-            gather.seen_nodes(&solution, &view, &turned, &mut seen);
+            gather.seen_nodes(&solution, looks, &turned, &mut seen);
             let sum: f64 = seen.iter().map(|seen| seen.form_factor).sum();
             turned_sums.push(sum - (1.0 + cos) / 2.0);
         }

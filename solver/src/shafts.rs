@@ -12,7 +12,6 @@ use crate::form_factor::form_factor_at;
 use crate::lamp_rays::FaintGroups;
 use crate::leaf_gather::{LeafGather, Source};
 use crate::polygon_tree::Stands;
-use crate::ray_gather::View;
 use crate::visibility::{Shaft, facing_parts};
 use crate::{Gather, Interaction, NodeId};
 
@@ -127,7 +126,7 @@ impl<'a> Gather<'a> {
         blockers.sort_unstable();
         blockers.dedup();
         let faint = FaintGroups::new(cut.groups, element);
-        LeafGather { gather: self, polygon, centre, sources, faint, view: View::default(), sky, blockers }
+        LeafGather { gather: self, polygon, centre, sources, faint, rays: 0, sky, blockers }
     }
 
     /// What stands in the shaft between an emitter and an element.
