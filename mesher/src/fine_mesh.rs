@@ -15,7 +15,7 @@ use crate::guess::guessed_emitted;
 use crate::inquiry::Inquiry;
 use crate::lines::Lines;
 use crate::probe::{colour_mean, probe_point};
-use crate::samples::QueryKey;
+use crate::samples::ByQuery;
 use crate::small_patch::middle_of_small;
 use crate::{
     Leaf, LeafSegment, Mesh, RankedLine, SampleQuery, SampleTable, Weight, edge_table, leaf_meshes, rank, sample_table,
@@ -46,7 +46,7 @@ pub(crate) struct FineMesh {
 /// Which answer is the irradiance from emitters, at every point that was asked for so far: from mesh to mesh most stay.
 #[derive(Default)]
 pub(crate) struct EmittedLight {
-    light: HashMap<QueryKey, u32>,
+    light: ByQuery<u32>,
     /// What stands between each leaf and the emitters.
     shafts: HashMap<NodeId, Shafts>,
 }

@@ -9,10 +9,10 @@ use solver::{Cosine, Fan, NodeId, Solution, Visibility};
 use crate::probe::colour_mean;
 use crate::{SampleQuery, SampleTable};
 
-/// Area of a leaf for which it is probed once, as a part of that of all surfaces, and probes of a leaf at most. More probes miss
-/// less of what lies in large leaves, which make up most of the error where they are wrong.
-const PROBED: f64 = 1.0 / 6000.0;
-const MOST_PROBES: f64 = 4.0;
+/// Probes of a leaf at most, where rays find the light: one for as much area as all leaves have on average, and as many in all as twice
+/// the leaves at most. More on leaves that are larger than others miss less of what lies in them, which makes up most of
+/// the error where they are wrong: a ceiling right over small lamps.
+const MOST_PROBES: f64 = 16.0;
 
 /// Where the probe of an element lies in a scene with links, by parts of its centre and two corners: off all lines of symmetry, on
 /// which an interpolant may be right by chance.
@@ -96,8 +96,8 @@ fn more_scatter(leaves: &[ProbedLeaf]) -> f64 {
     times.select_nth_unstable_by(middle, f64::total_cmp).1.clamp(1.0, MOST_SCATTER)
 }
 
-/// The points at which elements are probed, in their order: one each, and in a scene whose light is found by rays up to four
-/// on large ones and one more beside a contact, where most of what is wrong is. `table` has the samples of a mesh of the
+/// The points at which elements are probed, in their order: one each, and in a scene whose light is found by rays more on
+/// large ones and one more beside a contact, where most of what is wrong is. `table` has the samples of a mesh of the
 /// elements.
 pub(crate) fn leaf_probes(
     scene: &Scene,
@@ -105,7 +105,7 @@ pub(crate) fn leaf_probes(
     elements: &[NodeId],
     table: &SampleTable,
 ) -> Vec<SampleQuery> {
-    let area = PROBED * scene.surface_area();
+    let area = scene.surface_area() / elements.len() as f64;
     let nodes = &solution.elements.nodes;
     let count = |element: NodeId| match solution.visibility {
         Visibility::Links => 1,
@@ -195,18 +195,22 @@ mod tests {
         let solution = solve(&scene, &SolveOptions::default(), &|_| ());
         assert_eq!(solution.visibility, Visibility::Rays);
         let (strip, large) = (solution.leaves_of(7)[0], solution.leaves_of(400)[0]);
+        let leaves: Vec<NodeId> = scene.polygon_ids().flat_map(|polygon| solution.leaves_of(polygon)).collect();
         let contact =
             SampleQuery { position: DVec3::new(7e-3, 0.0, 0.0), inward: DVec3::Y, ..probe(&solution, strip, 0) };
         let table = SampleTable { queries: vec![contact], triangles: Vec::new() };
         let count = |table: &SampleTable| {
-            let probes = leaf_probes(&scene, &solution, &[strip, large], table);
+            let probes = leaf_probes(&scene, &solution, &leaves, table);
+            assert!(probes.len() <= 2 * leaves.len() + table.queries.len());
             assert!(probes.iter().all(|probe| probe.inward == DVec3::ZERO));
             [strip, large].map(|element| probes.iter().filter(|probe| probe.element == element).count())
         };
         let [alone, many] = count(&SampleTable::default());
         assert!(alone < many && many <= MOST_PROBES as usize, "{alone} {many}");
         assert_eq!(count(&table), [alone + 1, many]);
-        let beside = leaf_probes(&scene, &solution, &[strip], &table)[alone].position;
+        let probes = leaf_probes(&scene, &solution, &leaves, &table);
+        let of_strip: Vec<&SampleQuery> = probes.iter().filter(|probe| probe.element == strip).collect();
+        let beside = of_strip[alone].position;
         assert!(beside.distance(contact.position.lerp(solution.elements.nodes[strip as usize].centre, BESIDE)) < 1e-9);
     }
 }

@@ -9,8 +9,6 @@
 //! Which leaves are divided is decided by what the coarse mesh gets wrong at points that it was not fitted to, not by what
 //! single links carry (Hardt & Teller 1996, section 7.2).
 
-use std::collections::HashMap;
-
 use glam::{DVec2, DVec3, Vec3};
 use rayon::prelude::*;
 use scene::{Rgb, Scene, Seen};
@@ -22,7 +20,7 @@ use crate::fine_mesh::FineMesh;
 use crate::inquiry::Inquiry;
 use crate::leaf_error::{LeafError, ProbedLeaf, leaf_errors, leaf_probes, probe};
 use crate::projection::Projection;
-use crate::samples::QueryKey;
+use crate::samples::ByQuery;
 use crate::stand_ins::StandIns;
 
 /// Light over reflectors on all surfaces.
@@ -30,7 +28,7 @@ pub(crate) struct ReflectedLight {
     /// The leaves of the coarse mesh, elements of the solution.
     front: Vec<NodeId>,
     /// Which answer is what a sample sees, by what it is asked: kept from mesh to mesh.
-    rows: HashMap<QueryKey, u32>,
+    rows: ByQuery<u32>,
     /// The source error that the rows were found with.
     source_error: f64,
     coarse: CoarseMesh,
@@ -55,7 +53,13 @@ impl ReflectedLight {
                 open.extend(elements.children(node).rev());
             }
         }
-        Self { front, rows: HashMap::new(), source_error: 0.0, coarse: CoarseMesh::default(), reflecting: Vec::new() }
+        Self {
+            front,
+            rows: ByQuery::default(),
+            source_error: 0.0,
+            coarse: CoarseMesh::default(),
+            reflecting: Vec::new(),
+        }
     }
 
     /// Finds the light: meshes the front, finds what new samples see, and sends light to and fro. If the bake is stopped meanwhile,

@@ -282,7 +282,7 @@ impl<'a> Gather<'a> {
     pub fn misplaced(&self, node: NodeId, form_factor: f64) -> f64 {
         let solution = self.solution;
         if let Some(rays) = self.rays() {
-            return rays.misplaced(solution, node);
+            return rays.misplaced(solution, node, form_factor);
         }
         let polygon = solution.elements.polygon_of(node).unwrap_or_default();
         let reflectance = luminance(self.scene.reflectance(polygon));

@@ -3,6 +3,8 @@
 //! Rays are spread evenly over the hemisphere, by the cosine, and each meets what it meets: so nothing counts twice and nothing is lost.
 //! Nothing leaks: a ray stops where it should. What it costs grows with the logarithm of the number of polygons.
 
+use std::f64::consts::PI;
+
 use glam::DVec3;
 use scene::{Bvh, Ray, Scene, luminance, other_sides};
 
@@ -117,7 +119,12 @@ impl RayGather {
             }
             let patch = &elements.patches[self.patches[hit.id as usize] as usize];
             let place = position + direction * hit.distance;
-            let node = self.standing_for(solution, patch, place);
+            // By each ray something else: were all that a point sees off by as much, the sum would be as of one such part. What is
+            // near fills more of the hemisphere, and all of its light is off in one direction.
+            let part = 1.0 / f64::from(self.rays).sqrt();
+            let per_area = -hit.normal.dot(direction) / (PI * hit.distance * hit.distance);
+            let form_factor = |node: NodeId| (elements.nodes[node as usize].area * per_area).clamp(part, 1.0);
+            let node = self.standing_for(solution, patch, place, form_factor);
             let offset = patch.along(place - elements.nodes[node as usize].centre);
             seen.push(SeenNode { node, form_factor: share, offset });
         }
@@ -129,11 +136,11 @@ impl RayGather {
         other == polygon || self.other_sides[polygon as usize] == Some(other)
     }
 
-    /// How much light, luminance, W·m⁻², is misplaced at a point where planes that misplace as much as this node's does stand
-    /// for all leaves that it sees: by each ray something else.
-    pub fn misplaced(&self, solution: &Solution, node: NodeId) -> f64 {
+    /// How much light, luminance, W·m⁻², is misplaced at a point where a plane stands for what it sees of a node by such a form
+    /// factor.
+    pub fn misplaced(&self, solution: &Solution, node: NodeId, form_factor: f64) -> f64 {
         let polygon = solution.elements.polygon_of(node).unwrap_or_default();
-        self.reflectances[polygon as usize] * solution.light[node as usize].deviation / f64::from(self.rays).sqrt()
+        self.reflectances[polygon as usize] * solution.light[node as usize].deviation * form_factor
     }
 
     /// What rays are taken to be off by at a point of an element, root mean square, relative to the light over reflectors there.
@@ -141,8 +148,14 @@ impl RayGather {
         scatter_of(self.rays_over(solution, element))
     }
 
-    /// The largest node of a patch around a place that is good enough.
-    fn standing_for(&self, solution: &Solution, patch: &Patch, place: DVec3) -> NodeId {
+    /// The largest node of a patch around a place that is good enough, as much as is seen of it.
+    fn standing_for(
+        &self,
+        solution: &Solution,
+        patch: &Patch,
+        place: DVec3,
+        form_factor: impl Fn(NodeId) -> f64,
+    ) -> NodeId {
         let elements = &solution.elements;
         let place = patch.along(place - patch.origin);
         let outside = |child: NodeId| {
@@ -150,7 +163,7 @@ impl RayGather {
             (cell.cell_min - place).max(place - cell.cell_max).max_element()
         };
         let mut node = patch.root;
-        while self.misplaced(solution, node) > self.budget
+        while self.misplaced(solution, node, form_factor(node)) > self.budget
             && let Some(child) = elements.children(node).min_by(|&a, &b| outside(a).total_cmp(&outside(b)))
         {
             node = child;
@@ -208,6 +221,34 @@ mod tests {
         let mut none = Vec::new();
         merge(&mut none, 0);
         assert!(none.is_empty());
+    }
+
+    /// On a floor under a box whose bottom is as near as a twentieth of a metre: what fills much of a hemisphere is opened as far as
+    /// its light asks for, as what is far is.
+    #[test]
+    fn what_is_near_is_opened_until_little_is_misplaced() {
+        let room = Builder::default()
+            .material(0.6, 1.0)
+            .cuboid([0.0, 0.0, 0.0], [4.0, 3.0, 2.5], true)
+            .cuboid([0.7, 0.5, 0.05], [1.5, 1.4, 0.8], false)
+            .build();
+        let solution = solve(&room, &SolveOptions { link_error: Some(0.02), bounces: None }, &|_| ());
+        let (rays, budget) = (1024, 0.05);
+        let gather = RayGather::new(&room, &solution, rays, budget, 0);
+        let mut opened = 0;
+        for i in 0..40 {
+            let position = DVec3::new(0.55 + 0.03 * f64::from(i), 0.6 + 0.02 * f64::from(i * 7 % 40), 0.0);
+            let mut seen = Vec::new();
+            gather.seen_nodes(&solution, (4, rays), &Viewpoint::flat(position, DVec3::Z, DVec3::ZERO), &mut seen);
+            for SeenNode { node, form_factor, .. } in seen {
+                let is_leaf = solution.elements.is_leaf(node);
+                let is_root = solution.elements.patches.iter().any(|patch| patch.root == node);
+                opened += usize::from(!is_root && form_factor > 1.0 / f64::from(rays).sqrt());
+                // Rays tell a form factor to a quarter or so.
+                assert!(is_leaf || gather.misplaced(&solution, node, form_factor) < 1.3 * budget);
+            }
+        }
+        assert!(opened > 40, "{opened}");
     }
 
     /// In a closed, furnished room what is seen adds up to the hemisphere.
