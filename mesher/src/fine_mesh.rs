@@ -135,8 +135,10 @@ impl EmittedLight {
         queries: impl Iterator<Item = &'a SampleQuery>,
         inquiry: &mut Inquiry<'_>,
     ) {
-        let mut unknown: Vec<&SampleQuery> = queries.filter(|query| !self.light.contains_key(&query.key())).collect();
-        unknown.sort_by_key(|query| query.element);
+        let queries: Vec<&SampleQuery> = queries.collect();
+        let mut unknown: Vec<&SampleQuery> =
+            queries.into_par_iter().filter(|query| !self.light.contains_key(&query.key())).collect();
+        unknown.par_sort_by_key(|query| query.element);
         unknown.dedup_by_key(|query| query.key());
         // What stands in a shaft is the same whoever looks first.
         let shafts = Mutex::new(std::mem::take(&mut self.shafts));

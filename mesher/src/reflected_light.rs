@@ -224,11 +224,13 @@ impl ReflectedLight {
         }
         let stale = if solution.visibility == Visibility::Rays { f64::INFINITY } else { stale };
         let allowed = stale * gather.budget();
-        let mut unknown: Vec<&SampleQuery> = queries
-            .iter()
-            .filter(|query| self.rows.get(&query.key()).is_none_or(|&row| is_stale(&gather, inquiry.row(row), allowed)))
-            .collect();
-        unknown.sort_by_key(|query| query.element);
+        let inquiry_so_far = &*inquiry;
+        let is_unknown = |query: &&SampleQuery| {
+            let known = self.rows.get(&query.key());
+            known.is_none_or(|&row| is_stale(&gather, inquiry_so_far.row(row), allowed))
+        };
+        let mut unknown: Vec<&SampleQuery> = queries.par_iter().filter(is_unknown).collect();
+        unknown.par_sort_by_key(|query| query.element);
         unknown.dedup_by_key(|query| query.key());
         let found = inquiry.rows(&unknown, solution.elements.nodes.len(), |group| {
             let element = gather.over_reflectors(group[0].element);
