@@ -27,8 +27,9 @@ const MESHES: u32 = 12;
 const MESHES_BY_RAYS: u32 = 4;
 const FEW: usize = 50;
 
-/// The part of the error that is allowed, as a square, down to which leaves are divided where rays find the light if that takes but
-/// few: in a hall the ceiling over each lamp holds more of it than all boxes, in one of 300 leaves.
+/// Where rays find the light, leaves are divided down to this part of the allowed square even if the whole keeps it, as long as
+/// they are few, and meshes too: in a hall one leaf in 300, over a lamp, holds more of the error than all boxes. Less divides by
+/// chance, more leaves what costs next to nothing to mend.
 const CHEAP: f64 = 0.25;
 
 /// Discontinuities that a leaf follows at most where links have not told them: a leaf that is wanting is divided besides. Ten
@@ -107,7 +108,7 @@ impl Rounds<'_> {
                     (error.element, error.error / own.max(self.mean))
                 })
                 .collect();
-            let (divided, excess) = self.wanting(&leaves);
+            let (divided, excess) = self.wanting(&leaves, mesh);
             self.inquiry.expect_division(excess);
             let by_chance = self.solution.visibility == Visibility::Rays
                 && mesh >= MESHES_BY_RAYS
@@ -189,7 +190,7 @@ impl Rounds<'_> {
                 fine = self.fine_mesh();
             }
         }
-        for _ in 0..MESHES {
+        for mesh in 1..=MESHES {
             let mut leaves: Vec<(NodeId, f64)> = fine.leaves.iter().map(|leaf| (leaf.element, 0.0)).collect();
             for (triangle, (error, emitted)) in fine.probe_emitted().into_iter().enumerate() {
                 let leaf = fine.mesh.triangles[triangle].leaf as usize;
@@ -201,7 +202,7 @@ impl Rounds<'_> {
             }
             leaves.iter_mut().for_each(|leaf| leaf.1 = leaf.1.sqrt());
             self.show(&fine);
-            let (divided, _) = self.wanting(&leaves);
+            let (divided, _) = self.wanting(&leaves, mesh);
             if divided.is_empty() || fine.triangles() > self.options.max_triangles {
                 break;
             }
@@ -248,9 +249,9 @@ impl Rounds<'_> {
             .collect()
     }
 
-    /// Of elements with their relative errors, those that are to be divided so that this round's share is kept, ascending; and the
-    /// error of all in such shares.
-    fn wanting(&self, leaves: &[(NodeId, f64)]) -> (Vec<NodeId>, f64) {
+    /// Of elements with their relative errors on a round's mesh of that number, those that are to be divided so that this round's
+    /// share is kept, or more if they are few, ascending; and the error of all in such shares, at least 1.
+    fn wanting(&self, leaves: &[(NodeId, f64)], mesh: u32) -> (Vec<NodeId>, f64) {
         let elements = &self.solution.elements;
         let area = |leaf: NodeId| elements.nodes[leaf as usize].area;
         let total: f64 = leaves.iter().map(|&(leaf, _)| area(leaf)).sum();
@@ -264,8 +265,8 @@ impl Rounds<'_> {
             })
             .collect();
         let square = weighted.iter().sum::<f64>();
-        let few =
-            |chosen: &Vec<usize>| chosen.len() * FEW <= leaves.len() && self.solution.visibility == Visibility::Rays;
+        let by_rays = self.solution.visibility == Visibility::Rays;
+        let few = |chosen: &Vec<usize>| by_rays && mesh < MESHES_BY_RAYS && chosen.len() * FEW <= leaves.len();
         let cheap = Some(worst(&weighted, CHEAP * allowed)).filter(few);
         let chosen = match cheap {
             Some(chosen) => chosen,
