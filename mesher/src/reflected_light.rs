@@ -222,12 +222,12 @@ impl ReflectedLight {
             self.rows.clear();
             self.source_error = options.source_error;
         }
-        let stale = if solution.visibility == Visibility::Rays { f64::INFINITY } else { stale };
+        let may_be_stale = solution.visibility == Visibility::Links;
         let allowed = stale * gather.budget();
         let inquiry_so_far = &*inquiry;
         let is_unknown = |query: &&SampleQuery| {
             let known = self.rows.get(&query.key());
-            known.is_none_or(|&row| is_stale(&gather, inquiry_so_far.row(row), allowed))
+            known.is_none_or(|&row| may_be_stale && is_stale(&gather, inquiry_so_far.row(row), allowed))
         };
         let mut unknown: Vec<&SampleQuery> = queries.par_iter().filter(is_unknown).collect();
         unknown.par_sort_by_key(|query| query.element);

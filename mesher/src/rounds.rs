@@ -266,12 +266,13 @@ impl Rounds<'_> {
             .collect();
         let square = weighted.iter().sum::<f64>();
         let by_rays = self.solution.visibility == Visibility::Rays;
-        let few = |chosen: &Vec<usize>| by_rays && mesh < MESHES_BY_RAYS && chosen.len() * FEW <= leaves.len();
-        let cheap = Some(worst(&weighted, CHEAP * allowed)).filter(few);
-        let chosen = match cheap {
-            Some(chosen) => chosen,
-            None if square <= allowed => Vec::new(),
-            None => worst(&weighted, AIM * allowed),
+        let cheap = if by_rays && mesh < MESHES_BY_RAYS { worst(&weighted, CHEAP * allowed) } else { Vec::new() };
+        let chosen = if !cheap.is_empty() && cheap.len() * FEW <= leaves.len() {
+            cheap
+        } else if square > allowed {
+            worst(&weighted, AIM * allowed)
+        } else {
+            Vec::new()
         };
         if chosen.is_empty() {
             return (Vec::new(), 1.0);

@@ -36,8 +36,8 @@ pub struct SampleQuery {
 /// checksums of 64 bits, of which no two queries of a bake have both in common. In full it would be three times as long.
 pub(crate) type QueryKey = [u64; 2];
 
-/// Something about queries. Their keys are spread evenly already, and there are millions: a hash that nobody can attack would
-/// take a tenth of the time of a bake.
+/// Something about queries. Their keys are spread evenly already, there are millions of them, and nobody attacks a bake: what the
+/// standard library's hash takes for that is a few percent of its time.
 pub(crate) type ByQuery<T> = HashMap<QueryKey, T, fast::FixedState>;
 
 impl SampleQuery {
@@ -92,9 +92,6 @@ enum Side {
     Of(u32),
 }
 
-/// Triangles whose samples are told apart in parallel before the next.
-const AT_A_TIME: usize = 16_384;
-
 /// Finds the samples of a mesh, all by polygons' own normals. `contact` says how other polygons touch a point of a polygon;
 /// it is asked only on borders of leaves, which is where contact can be.
 pub fn sample_table(
@@ -122,37 +119,26 @@ pub fn sample_table(
     let normals: Vec<DVec3> = scene.polygon_ids().map(|polygon| scene.plane(polygon).normal).collect();
     let mut known: HashMap<(u32, Station, Side), u32, fast::FixedState> = HashMap::default();
     let mut table = SampleTable { queries: Vec::new(), triangles: Vec::with_capacity(mesh.triangles.len()) };
-    let sides = |id: u32| {
-        let triangle = &mesh.triangles[id as usize];
-        let polygon = polygon_of(triangle.leaf);
+    for (id, triangle) in (0..).zip(&mesh.triangles) {
+        let Leaf { polygon, element, .. } = leaves[triangle.leaf as usize];
         let middle = triangle.vertices.iter().map(|&vertex| mesh.vertices[vertex as usize]).sum::<DVec3>() / 3.0;
-        stations(triangle.vertices).map(|station| match contact_at(polygon, station) {
-            Contact::None => (Side::Any, DVec3::ZERO),
-            Contact::Line { direction } => {
-                let to_left = normals[polygon as usize].cross(direction);
-                let is_left = (middle - position(station)).dot(to_left) >= 0.0;
-                if is_left { (Side::Left, to_left) } else { (Side::Right, -to_left) }
-            }
-            Contact::Corner => (Side::Of(id), (middle - position(station)).normalize_or_zero()),
-        })
-    };
-    let ids: Vec<u32> = (0..mesh.triangles.len() as u32).collect();
-    // So many at a time: what is told of all triangles of a mesh would take as much memory as its samples.
-    for ids in ids.chunks(AT_A_TIME) {
-        let sides: Vec<[(Side, DVec3); 6]> = ids.par_iter().map(|&id| sides(id)).collect();
-        for (&id, sides) in ids.iter().zip(sides) {
-            let triangle = &mesh.triangles[id as usize];
-            let Leaf { polygon, element, .. } = leaves[triangle.leaf as usize];
-            let stations = stations(triangle.vertices);
-            table.triangles.push(std::array::from_fn(|i| {
-                let (station, (side, inward)) = (stations[i], sides[i]);
-                *known.entry((polygon, station, side)).or_insert_with(|| {
-                    let position = position(station);
-                    table.queries.push(SampleQuery { position, polygon, element, inward, cosine: Cosine::Own });
-                    table.queries.len() as u32 - 1
-                })
-            }));
-        }
+        let samples = stations(triangle.vertices).map(|station| {
+            let position = position(station);
+            let inward = (middle - position).normalize_or_zero();
+            let (side, inward) = match contact_at(polygon, station) {
+                Contact::None => (Side::Any, DVec3::ZERO),
+                Contact::Line { direction } => {
+                    let to_left = normals[polygon as usize].cross(direction);
+                    if inward.dot(to_left) >= 0.0 { (Side::Left, to_left) } else { (Side::Right, -to_left) }
+                }
+                Contact::Corner => (Side::Of(id), inward),
+            };
+            *known.entry((polygon, station, side)).or_insert_with(|| {
+                table.queries.push(SampleQuery { position, polygon, element, inward, cosine: Cosine::Own });
+                table.queries.len() as u32 - 1
+            })
+        });
+        table.triangles.push(samples);
     }
     table.queries.shrink_to_fit();
     table
