@@ -13,7 +13,7 @@ use rayon::prelude::*;
 use scene::Scene;
 use solver::{Contact, Cosine};
 
-use crate::{Leaf, Mesh};
+use crate::{Leaf, Mesh, MeshTriangle};
 
 /// A question for irradiance.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -79,7 +79,7 @@ impl SampleTable {
 /// A vertex, given twice, or the midpoint between two vertices, the smaller first.
 type Station = [u32; 2];
 
-/// What tells samples at one station of one polygon apart.
+/// What tells samples at one station of a polygon apart.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 enum Side {
     /// All triangles agree.
@@ -92,55 +92,84 @@ enum Side {
     Of(u32),
 }
 
-/// Finds the samples of a mesh, all by polygons' own normals. `contact` says how other polygons touch a point of a polygon;
-/// it is asked only on borders of leaves, which is where contact can be.
+/// Finds the samples of a mesh, all by polygons' own normals; the leaves of a polygon stand together. `contact` says how other
+/// polygons touch a point of a polygon; it is asked only on borders of leaves, which is where contact can be.
 pub fn sample_table(
     scene: &Scene,
     leaves: &[Leaf],
     mesh: &Mesh,
     contact: &(dyn Fn(u32, DVec3) -> Contact + Sync),
 ) -> SampleTable {
-    let position = |[a, b]: Station| (mesh.vertices[a as usize] + mesh.vertices[b as usize]) / 2.0;
-    let polygon_of = |leaf: u32| leaves[leaf as usize].polygon;
-
-    let mut on_borders: Vec<(u32, Station)> = Vec::new();
-    for triangle in &mesh.triangles {
-        let stations = stations(triangle.vertices).into_iter().filter(|station| station[1] < mesh.border_vertices);
-        on_borders.extend(stations.map(|station| (polygon_of(triangle.leaf), station)));
-    }
-    on_borders.par_sort_unstable();
-    on_borders.dedup();
-    let contacts: Vec<Contact> =
-        on_borders.par_iter().map(|&(polygon, station)| contact(polygon, position(station))).collect();
-    let contact_at = |polygon: u32, station: Station| {
-        on_borders.binary_search(&(polygon, station)).map_or(Contact::None, |place| contacts[place])
+    let leaf_of = |triangle: &MeshTriangle| &leaves[triangle.leaf as usize];
+    // Polygons have no samples in common.
+    let of_polygons: Vec<&[MeshTriangle]> =
+        mesh.triangles.chunk_by(|a, b| leaf_of(a).polygon == leaf_of(b).polygon).collect();
+    let tables: Vec<SampleTable> = of_polygons
+        .par_iter()
+        .map(|triangles| {
+            let polygon = leaf_of(&triangles[0]).polygon;
+            samples_on(polygon, leaves, (mesh, triangles), scene.plane(polygon).normal, |position| {
+                contact(polygon, position)
+            })
+        })
+        .collect();
+    let mut all = SampleTable {
+        queries: Vec::with_capacity(tables.iter().map(|table| table.queries.len()).sum()),
+        triangles: Vec::with_capacity(mesh.triangles.len()),
     };
+    for table in tables {
+        let first = all.queries.len() as u32;
+        all.queries.extend(table.queries);
+        all.triangles.extend(table.triangles.into_iter().map(|samples| samples.map(|sample| first + sample)));
+    }
+    all
+}
 
-    let normals: Vec<DVec3> = scene.polygon_ids().map(|polygon| scene.plane(polygon).normal).collect();
-    let mut known: HashMap<(u32, Station, Side), u32, fast::FixedState> = HashMap::default();
-    let mut table = SampleTable { queries: Vec::new(), triangles: Vec::with_capacity(mesh.triangles.len()) };
-    for (id, triangle) in (0..).zip(&mesh.triangles) {
-        let Leaf { polygon, element, .. } = leaves[triangle.leaf as usize];
+/// The samples of the triangles on one polygon.
+fn samples_on(
+    polygon: u32,
+    leaves: &[Leaf],
+    (mesh, triangles): (&Mesh, &[MeshTriangle]),
+    normal: DVec3,
+    contact: impl Fn(DVec3) -> Contact + Sync,
+) -> SampleTable {
+    let position = |[a, b]: Station| (mesh.vertices[a as usize] + mesh.vertices[b as usize]) / 2.0;
+    let mut on_borders: Vec<Station> = triangles
+        .iter()
+        .flat_map(|triangle| stations(triangle.vertices))
+        .filter(|station| station[1] < mesh.border_vertices)
+        .collect();
+    on_borders.sort_unstable();
+    on_borders.dedup();
+    let touched = |&station: &Station| {
+        let contact = contact(position(station));
+        (contact != Contact::None).then_some((station, contact))
+    };
+    let contacts: HashMap<Station, Contact, fast::FixedState> = on_borders.par_iter().filter_map(touched).collect();
+
+    let mut known: HashMap<(Station, Side), u32, fast::FixedState> = HashMap::default();
+    let mut table = SampleTable { queries: Vec::new(), triangles: Vec::with_capacity(triangles.len()) };
+    for (id, triangle) in (0..).zip(triangles) {
+        let element = leaves[triangle.leaf as usize].element;
         let middle = triangle.vertices.iter().map(|&vertex| mesh.vertices[vertex as usize]).sum::<DVec3>() / 3.0;
         let samples = stations(triangle.vertices).map(|station| {
             let position = position(station);
             let inward = (middle - position).normalize_or_zero();
-            let (side, inward) = match contact_at(polygon, station) {
-                Contact::None => (Side::Any, DVec3::ZERO),
-                Contact::Line { direction } => {
-                    let to_left = normals[polygon as usize].cross(direction);
+            let (side, inward) = match contacts.get(&station) {
+                None | Some(Contact::None) => (Side::Any, DVec3::ZERO),
+                Some(Contact::Line { direction }) => {
+                    let to_left = normal.cross(*direction);
                     if inward.dot(to_left) >= 0.0 { (Side::Left, to_left) } else { (Side::Right, -to_left) }
                 }
-                Contact::Corner => (Side::Of(id), inward),
+                Some(Contact::Corner) => (Side::Of(id), inward),
             };
-            *known.entry((polygon, station, side)).or_insert_with(|| {
+            *known.entry((station, side)).or_insert_with(|| {
                 table.queries.push(SampleQuery { position, polygon, element, inward, cosine: Cosine::Own });
                 table.queries.len() as u32 - 1
             })
         });
         table.triangles.push(samples);
     }
-    table.queries.shrink_to_fit();
     table
 }
 
