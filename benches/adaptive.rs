@@ -21,7 +21,7 @@ use renderer::{
     UniformSampler, Whitted, sample_histogram,
 };
 use scene::{Bvh, Camera, Display, Exposure, Gloss, Light, Material, Rgb, Scene, ToneCurve};
-use solver::{Gather, SolveOptions};
+use solver::{Gather, SolveOptions, Surroundings};
 
 /// The interval of the paper's confidence, which pixels are held to.
 const INTERVAL: f64 = 1.0 / 255.0;
@@ -82,7 +82,8 @@ impl View {
     fn look<T>(&self, side: u32, work: impl FnOnce(&Evaluator<'_>) -> T) -> T {
         let options = SolveOptions { link_error: None, bounces: Some(0) };
         let solution = solver::solve(&self.scene, &options, &|_| {});
-        let gather = Gather::new(&self.scene, &solution);
+        let surroundings = Surroundings::new(&self.scene, &solution);
+        let gather = Gather::new(&surroundings, &solution);
         let points = PointGather::new(&self.scene, &solution, &gather);
         let direct = |point: &SurfacePoint| points.irradiance(point);
         let bvh = Bvh::of_scene(&self.scene);

@@ -15,7 +15,7 @@ use measure::{SCENES, Truth, on_curve, percent, read, solved, unrefined};
 use mesher::BakeOptions;
 use rayon::prelude::*;
 use scene::{Baked, Rgb, Scene};
-use solver::{Gather, Solution};
+use solver::{Gather, Solution, Surroundings};
 
 /// Multiples of the default link error and of the default w_min, coarse meshes to fine ones.
 const MESHES: [(f64, f64); 4] = [(32.0, 16.0), (8.0, 4.0), (1.0, 1.0), (0.125, 0.25)];
@@ -86,7 +86,8 @@ fn samples(baked: &Baked) -> [usize; 4] {
 fn errors(scene: &Scene, solution: &Solution, baked: &Baked) -> [f64; 4] {
     let truth = Truth::of(scene, solution);
     let places = truth.places(baked);
-    let gather = Gather::new(scene, solution);
+    let surroundings = Surroundings::new(scene, solution);
+    let gather = Gather::new(&surroundings, solution);
     let mut hit: Vec<u32> = places.iter().map(|place| place.0).collect();
     hit.sort_unstable();
     hit.dedup();

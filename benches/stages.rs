@@ -11,7 +11,7 @@ use divan::{Bencher, black_box};
 use glam::DVec3;
 use mesher::{Leaf, LeafSegment, edge_table, leaf_meshes};
 use scene::{Interpolant, Material, Polygon, Rgb, SAMPLE_BARYCENTRICS, Scene, centroid};
-use solver::{Gather, SolveOptions, form_factor, form_factor_at, solve};
+use solver::{Gather, SolveOptions, Surroundings, form_factor, form_factor_at, solve};
 
 fn main() {
     divan::main();
@@ -61,7 +61,8 @@ mod point_irradiance {
         let solution = solve(&scene, &SolveOptions { bounces, ..SolveOptions::default() }, &|_| ());
         let all: Vec<_> = scene.polygon_ids().flat_map(|polygon| solution.leaves_of(polygon)).collect();
         let leaves: Vec<_> = (0..LEAVES).map(|i| all[i * all.len() / LEAVES]).collect();
-        let gather = Gather::new(&scene, &solution);
+        let surroundings = Surroundings::new(&scene, &solution);
+        let gather = Gather::new(&surroundings, &solution);
         bencher.counter(ItemsCount::new(LEAVES)).bench(|| {
             let irradiance =
                 |&leaf: &u32| gather.over(leaf).irradiance(centroid(solution.elements.outline(leaf)), DVec3::X);

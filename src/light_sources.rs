@@ -7,7 +7,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use glam::{DVec2, DVec3};
 use scene::{Baked, Bvh, Rgb, Scene, centroid};
-use solver::{Contribution, ElementLight, Gather, NodeId, Sender, Solution, SolveOptions, colour_slope};
+use solver::{Contribution, ElementLight, Gather, NodeId, Sender, Solution, SolveOptions, Surroundings, colour_slope};
 use viewer::{LightSource, SurfacePoint};
 
 use crate::pipeline;
@@ -37,7 +37,11 @@ impl LightSources {
         let position = a * (1.0 - s - t) + b * s + c * t;
         // On a contact line the side of the triangle counts.
         let inward = (a + b + c) / 3.0 - position;
-        let found = Gather::new(scene, &solution).contributions_at(record.polygon, position, inward);
+        let found = Gather::new(&Surroundings::new(scene, &solution), &solution).contributions_at(
+            record.polygon,
+            position,
+            inward,
+        );
         Ok(found.into_iter().map(|contribution| light_source(scene, contribution)).collect())
     }
 

@@ -8,7 +8,7 @@ use formats::SurfaceQuery;
 use rayon::prelude::*;
 use renderer::{Estimate, SurfacePoint};
 use scene::{Baked, Bvh, Provenance, Rgb, Scene, centroid};
-use solver::Gather;
+use solver::{Gather, Surroundings};
 
 use crate::args::{LightFlags, Method, ProbeFlags};
 use crate::failure::{Outcome, Usage};
@@ -109,7 +109,8 @@ fn interpolate(baked: &Baked, points: &[SurfaceQuery]) -> Vec<Option<Rgb>> {
 fn gather(scene: &Scene, flags: &LightFlags, points: &[SurfaceQuery]) -> Vec<Option<Rgb>> {
     // A gather from the bake: its reflectors send what the bake says that they do.
     let solution = pipeline::bake(scene, flags, None).solution;
-    let gather = Gather::new(scene, &solution);
+    let surroundings = Surroundings::new(scene, &solution);
+    let gather = Gather::new(&surroundings, &solution);
     let (bvh, reach) = (Bvh::of_scene(scene), REACH * scene.size());
     let (stage, done) = (Stage::start("gather"), AtomicUsize::new(0));
     let irradiance = |point: &SurfaceQuery| {

@@ -9,7 +9,7 @@ use renderer::{
     visible_lines,
 };
 use scene::{Baked, Bvh, Camera, DiscontinuityLine, Provenance, Scene};
-use solver::{Gather, Solution};
+use solver::{Gather, Solution, Surroundings};
 
 use crate::args::{LightFlags, RadianceChoice, RadianceFlags, RenderFlags};
 use crate::baked_points::BakedPoints;
@@ -149,7 +149,8 @@ fn by_interpolants<T>(baked: &Baked, view: &View, work: impl FnOnce(&Evaluator<'
 }
 
 fn by_gather<T>(scene: &Scene, solution: &Solution, view: &View, work: impl FnOnce(&Evaluator<'_>) -> T) -> T {
-    let gather = Gather::new(scene, solution);
+    let surroundings = Surroundings::new(scene, solution);
+    let gather = Gather::new(&surroundings, solution);
     let points = PointGather::new(scene, solution, &gather);
     let bvh = Bvh::of_scene(scene);
     let eye = view.eye(scene, &bvh);
@@ -169,7 +170,8 @@ fn by_paths<T>(scene: &Scene, view: &View, work: impl FnOnce(&Evaluator<'_>) -> 
 fn by_whitted<T>(scene: &Scene, view: &View, work: impl FnOnce(&Evaluator<'_>) -> T) -> T {
     let surfaces = Scene { environment: None, ..scene.clone() };
     let (solution, _) = pipeline::solve(&surfaces, &LightFlags { bounces: Some(0), ..LightFlags::default() }, None);
-    let gather = Gather::new(&surfaces, &solution);
+    let surroundings = Surroundings::new(&surfaces, &solution);
+    let gather = Gather::new(&surroundings, &solution);
     let points = PointGather::new(&surfaces, &solution, &gather);
     let direct = |point: &SurfacePoint| points.irradiance(point);
     let bvh = Bvh::of_scene(scene);
@@ -205,7 +207,8 @@ mod tests {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("data/scenes/cornell_box.obj");
         let scene = formats::read_scene(&path).unwrap().scene;
         let solution = solver::solve(&scene, &solver::SolveOptions { link_error: None, bounces: Some(0) }, &|_| {});
-        let gather = Gather::new(&scene, &solution);
+        let surroundings = Surroundings::new(&scene, &solution);
+        let gather = Gather::new(&surroundings, &solution);
         let points = renderer::spread_by_area(&scene, 200, 1e-3, 1, |_| true);
         let kept = PointGather::new(&scene, &solution, &gather);
         for point in points.iter().chain(points.iter().rev()) {

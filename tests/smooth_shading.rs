@@ -9,7 +9,7 @@ use mesher::{BakeOptions, Control};
 use rayon::prelude::*;
 use renderer::spread_by_area;
 use scene::{Baked, Bvh, Material, Polygon, Rgb, Scene, centroid};
-use solver::{Gather, SolveOptions, Visibility};
+use solver::{Gather, SolveOptions, Surroundings, Visibility};
 
 use crate::fixture::{box_faces, fails, folder, halflight, text};
 
@@ -112,7 +112,8 @@ fn scores(scene: &Scene, bake: &mesher::Bake, truth_of: &Scene, own: f64) -> Vec
     let points = spread_by_area(scene, 150, 1e-5, 7, |polygon| scene.has_shading_normals(polygon));
     let samples = vec![1 << 13; points.len()];
     let truth = renderer::irradiance_on(truth_of, &Bvh::of_scene(truth_of), &points, &samples, (None, 5), &|| ());
-    let gather = Gather::new(scene, &bake.solution);
+    let surroundings = Surroundings::new(scene, &bake.solution);
+    let gather = Gather::new(&surroundings, &bake.solution);
     let found: Vec<Rgb> = points
         .par_iter()
         .map(|p| gather.irradiance_at(p.polygon, p.position, centroid(&scene.outline(p.polygon)) - p.position))

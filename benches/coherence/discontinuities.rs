@@ -4,7 +4,7 @@
 use glam::DVec3;
 use renderer::{Eye, Filter, VisibleLine, object_edges, visible_lines};
 use scene::{Bvh, Exposure};
-use solver::{Gather, SolveOptions};
+use solver::{Gather, SolveOptions, Surroundings};
 
 use crate::common;
 use crate::pictures::{Compared, SUPERSAMPLE, columns, errors, refined};
@@ -26,7 +26,8 @@ pub fn run() {
         common::bake(name, &["--bounces", "0", "--tolerance", "0.05"], &file);
         let baked = formats::read_baked(&file).unwrap();
         let solution = solver::solve(&baked.scene, &SolveOptions { link_error: None, bounces: Some(0) }, &|_| {});
-        let gather = Gather::new(&baked.scene, &solution);
+        let surroundings = Surroundings::new(&baked.scene, &solution);
+        let gather = Gather::new(&surroundings, &solution);
         let points = PointGather::new(&baked.scene, &solution, &gather);
         let bvh = Bvh::of_scene(&baked.scene);
         let eye = Eye::new(&baked.scene, &bvh, baked.scene.cameras[0].camera, SIDE, SIDE);

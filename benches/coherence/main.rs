@@ -23,7 +23,7 @@ use pictures::{Compared, errors, picture, rmse, seen_at, timed};
 use point_gather::PointGather;
 use renderer::{AdaptiveOptions, AdaptiveSampler, Evaluator, Eye, Film, Filter};
 use scene::{Bvh, Display, Exposure, ToneCurve, luminance};
-use solver::{Gather, SolveOptions};
+use solver::{Gather, SolveOptions, Surroundings};
 
 /// Side of the pictures, pixels.
 const SIDE: u32 = 512;
@@ -51,7 +51,8 @@ fn tables(bounces: Option<u32>, side: u32) {
     for name in ["shelf_office", "gallery"] {
         let scene = formats::read_scene(&common::file(&format!("data/scenes/{name}.obj"))).unwrap().scene;
         let solution = solver::solve(&scene, &SolveOptions { link_error: None, bounces }, &|_| {});
-        let gather = Gather::new(&scene, &solution);
+        let surroundings = Surroundings::new(&scene, &solution);
+        let gather = Gather::new(&surroundings, &solution);
         let points = PointGather::new(&scene, &solution, &gather);
         let bvh = Bvh::of_scene(&scene);
         let eye = Eye::new(&scene, &bvh, scene.cameras[0].camera, side, side);

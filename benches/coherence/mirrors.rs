@@ -7,7 +7,7 @@ use renderer::{
     visible_lines,
 };
 use scene::{Bvh, Exposure, Rgb, Scene};
-use solver::{Gather, SolveOptions};
+use solver::{Gather, SolveOptions, Surroundings};
 
 use crate::generated;
 use crate::pictures::{Compared, SUPERSAMPLE, columns, errors, refined, seen_at};
@@ -34,7 +34,8 @@ pub fn run() {
 fn flat() {
     let scene = generated::looking_glass(9);
     let solution = solver::solve(&scene, &SolveOptions { link_error: None, bounces: Some(0) }, &|_| {});
-    let gather = Gather::new(&scene, &solution);
+    let surroundings = Surroundings::new(&scene, &solution);
+    let gather = Gather::new(&surroundings, &solution);
     let points = PointGather::new(&scene, &solution, &gather);
     let bvh = Bvh::of_scene(&scene);
     let direct = |point: &SurfacePoint| points.irradiance(point);

@@ -5,7 +5,7 @@ use renderer::{
     VisibleLine, object_edges, visible_lines,
 };
 use scene::{Bvh, Exposure, Scene};
-use solver::{Gather, SolveOptions};
+use solver::{Gather, SolveOptions, Surroundings};
 
 use crate::common;
 use crate::pictures::{SUPERSAMPLE, columns, errors, seen_at};
@@ -88,7 +88,8 @@ fn seen(lines: &[VisibleLine], rays: u64, evaluate: &Evaluator<'_>) -> (Coherenc
 /// Without noise, by a gather: every pixel over its area, and every pixel at its centre.
 fn truth(eye: &Eye<'_>, scene: &Scene, lines: &[VisibleLine]) -> [CoherenceMap; 2] {
     let solution = solver::solve(scene, &SolveOptions { link_error: None, bounces: None }, &|_| {});
-    let gather = Gather::new(scene, &solution);
+    let surroundings = Surroundings::new(scene, &solution);
+    let gather = Gather::new(&surroundings, &solution);
     let points = PointGather::new(scene, &solution, &gather);
     let exact = |point| eye.diffuse(point, |seen| (points.irradiance(seen), 0));
     let integral = PixelIntegral::new(&options(), 0.99, Interval::Linear(0.02), 1);

@@ -8,7 +8,7 @@ use mesher::{BakeOptions, BakeStatistics, Control};
 use rayon::prelude::*;
 use renderer::{SurfacePoint, spread_by_area};
 use scene::{Baked, Rgb, Scene, centroid};
-use solver::{Gather, Solution, SolveOptions, solve};
+use solver::{Gather, Solution, SolveOptions, Surroundings, solve};
 
 /// The scenes, by the names of their files in data/scenes.
 pub const SCENES: [&str; 2] = ["cornell_box", "office"];
@@ -48,7 +48,8 @@ pub struct Truth {
 impl Truth {
     pub fn of(scene: &Scene, solution: &Solution) -> Self {
         let points = spread_by_area(scene, POINTS, BORDER, 1, |_| true);
-        let gather = Gather::new(scene, solution);
+        let surroundings = Surroundings::new(scene, solution);
+        let gather = Gather::new(&surroundings, solution);
         let exact = |point: &SurfacePoint| {
             let inward = centroid(&scene.outline(point.polygon)) - point.position;
             gather.irradiance_at(point.polygon, point.position, inward)

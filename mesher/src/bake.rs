@@ -4,7 +4,7 @@
 //! round asks for less. Rounds are global: what is divided depends on the light alone, never on threads.
 
 use scene::{Answers, Baked, BakedError, Rgb, Scene};
-use solver::{Solution, Visibility};
+use solver::{Solution, Surroundings, Visibility};
 
 use crate::claimed_error::{P99, mean_reflectance, measured};
 use crate::fine_mesh::{EmittedLight, FineMesh};
@@ -161,8 +161,9 @@ pub fn resume(
     let reflectance = mean_reflectance(scene, &solution);
     // Without links elements are as small as they need to be at first.
     let front = if has_links { FRONT_LENGTH * scene.size() } else { 0.0 };
+    let surroundings = Surroundings::new(scene, &solution);
     let mut rounds = Rounds {
-        scene,
+        surroundings: &surroundings,
         options,
         watch: control.watch,
         inquiry: Inquiry::new(control, &solution, answers, options.max_bytes),
@@ -185,7 +186,7 @@ pub fn resume(
         let samples = rounds.samples(&fine);
         let reflecting = &rounds.reflected.reflecting;
         let inquiry = &mut rounds.inquiry;
-        let points = residual(scene, &rounds.solution, &fine, &samples, reflecting, options.tolerance, inquiry);
+        let points = residual(&surroundings, &rounds.solution, &fine, &samples, reflecting, options.tolerance, inquiry);
         if inquiry.stopped() {
             break best.unwrap_or((fine, samples, UNMEASURED));
         }

@@ -1,8 +1,8 @@
 //! The coarse mesh: large leaves without discontinuities, at whose samples light over reflectors is found.
 
 use glam::DVec3;
-use scene::{Interpolant, Rgb, Scene};
-use solver::{Gather, NodeId, Solution};
+use scene::{Interpolant, Rgb};
+use solver::{Gather, NodeId, Solution, Surroundings};
 
 use crate::{Leaf, Mesh, SampleQuery, SampleTable, edge_table, leaf_meshes, sample_table};
 
@@ -40,7 +40,8 @@ pub(crate) struct Place {
 
 impl CoarseMesh {
     /// Meshes elements of a solution, all dark.
-    pub fn new(scene: &Scene, solution: &Solution, front: &[NodeId]) -> Self {
+    pub fn new(surroundings: &Surroundings<'_>, solution: &Solution, front: &[NodeId]) -> Self {
+        let scene = surroundings.scene;
         let elements = &solution.elements;
         let leaf = |&element: &NodeId| Leaf {
             element,
@@ -50,7 +51,7 @@ impl CoarseMesh {
         };
         let leaves: Vec<Leaf> = front.iter().map(leaf).collect();
         let mesh = leaf_meshes(&edge_table(scene, &solution.cuts, &leaves));
-        let gather = Gather::new(scene, solution);
+        let gather = Gather::new(surroundings, solution);
         let mut table = sample_table(scene, &leaves, &mesh, &|polygon, position| gather.contact(polygon, position));
         let mut first = vec![0; leaves.len() + 1];
         for triangle in &mesh.triangles {

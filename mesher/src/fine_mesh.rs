@@ -9,7 +9,7 @@ use std::sync::{Mutex, PoisonError};
 use glam::DVec3;
 use rayon::prelude::*;
 use scene::{DiscontinuityLine, Rgb, SKY, Scene};
-use solver::{Cosine, Gather, NodeId, Shafts, Solution};
+use solver::{Cosine, Gather, NodeId, Shafts, Solution, Surroundings};
 
 use crate::guess::guessed_emitted;
 use crate::inquiry::Inquiry;
@@ -55,16 +55,17 @@ impl FineMesh {
     /// Meshes the solution's leaves with the `count` strongest discontinuities of each. An emitter that sends less than `dim` of
     /// the scene's mean irradiance to a point need not be seen exactly.
     pub fn new(
-        scene: &Scene,
+        surroundings: &Surroundings<'_>,
         solution: &Solution,
         (known_lines, weight, count): (&Lines, Weight, usize),
         dim: f64,
         known: &mut EmittedLight,
         inquiry: &mut Inquiry<'_>,
     ) -> Self {
+        let scene = surroundings.scene;
         let (leaves, lines) = divided_leaves(scene, solution, known_lines, weight, count);
         let mesh = leaf_meshes(&edge_table(scene, &solution.cuts, &leaves));
-        let gather = Gather::with_source_error(scene, solution, dim);
+        let gather = Gather::with_source_error(surroundings, solution, dim);
         let table = sample_table(scene, &leaves, &mesh, &|polygon, position| gather.contact(polygon, position));
         let mut fine = Self { leaves, lines, mesh, table, ..Self::default() };
         let probes: Vec<SampleQuery> =

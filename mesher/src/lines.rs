@@ -112,7 +112,7 @@ fn appended(all: &mut Vec<Discontinuity>, lines: Vec<Discontinuity>) -> Range<u3
 mod tests {
     use glam::DVec3;
     use scene::{Material, Rgb};
-    use solver::{SolveOptions, solve};
+    use solver::{SolveOptions, Surroundings, solve};
 
     use super::*;
     use crate::testing::scene_of;
@@ -139,7 +139,13 @@ mod tests {
         let solution = solve(&scene, &SolveOptions::default(), &|_| ());
         let mut lines = Lines::of_links(&scene, &solution, Weight::Ratio, Some(0.0));
         assert!(lines.all().is_empty());
-        lines.search(&scene, (&solution, &Gather::new(&scene, &solution)), &mut [], Weight::Ratio, |_| 0.0);
+        lines.search(
+            &scene,
+            (&solution, &Gather::new(&Surroundings::new(&scene, &solution), &solution)),
+            &mut [],
+            Weight::Ratio,
+            |_| 0.0,
+        );
         assert!(lines.all().is_empty());
         assert!(scene.polygon_ids().all(|polygon| {
             solution.leaves_of(polygon).into_iter().all(|leaf| lines.on(&solution, polygon, leaf).next().is_none())
@@ -167,7 +173,8 @@ mod tests {
         let mut crossed = Vec::new();
         for &leaf in &leaves {
             let known = lines.all().len();
-            let gather = Gather::with_source_error(&scene, &solution, 1e-3);
+            let surroundings = Surroundings::new(&scene, &solution);
+            let gather = Gather::with_source_error(&surroundings, &solution, 1e-3);
             let mut asked = [(leaf, Shafts::default())];
             lines.search(&scene, (&solution, &gather), &mut asked, Weight::Ratio, |_| 0.0);
             let outline = solution.elements.outline(leaf);
@@ -188,7 +195,8 @@ mod tests {
         assert!(crossed.len() > 4 && crossed.len() < leaves.len());
         let (leaf, known) = (crossed[0], lines.all().len());
         solution.subdivide(leaf);
-        let gather = Gather::with_source_error(&scene, &solution, 1e-3);
+        let surroundings = Surroundings::new(&scene, &solution);
+        let gather = Gather::with_source_error(&surroundings, &solution, 1e-3);
         let mut parts: Vec<(NodeId, Shafts)> =
             solution.elements.children(leaf).map(|part| (part, Shafts::default())).collect();
         lines.search(&scene, (&solution, &gather), &mut parts, Weight::Ratio, |_| 0.0);
@@ -205,7 +213,8 @@ mod tests {
         let outlines = [square(0.0, 0.0, 0.0, 2.0), square(0.3, 0.2, 1.0, 0.4)];
         let scene = Scene { environment: Some(environment), ..scene_of(&outlines) };
         let solution = solve(&scene, &SolveOptions::default(), &|_| ());
-        let gather = Gather::with_source_error(&scene, &solution, 1e-3);
+        let surroundings = Surroundings::new(&scene, &solution);
+        let gather = Gather::with_source_error(&surroundings, &solution, 1e-3);
         let mut lines = Lines::of_links(&scene, &solution, Weight::Change, None);
         let mut leaves: Vec<(NodeId, Shafts)> =
             solution.leaves_of(0).into_iter().map(|leaf| (leaf, Shafts::default())).collect();

@@ -12,7 +12,7 @@
 use glam::{DVec2, DVec3, Vec3};
 use rayon::prelude::*;
 use scene::{Rgb, Scene, Seen};
-use solver::{ElementLight, Gather, NodeId, SeenNode, Solution, Visibility};
+use solver::{ElementLight, Gather, NodeId, SeenNode, Solution, Surroundings, Visibility};
 
 use crate::SampleQuery;
 use crate::coarse_mesh::{CoarseMesh, Light, Place};
@@ -66,21 +66,22 @@ impl ReflectedLight {
     /// the light stays as it is.
     pub fn solve(
         &mut self,
-        scene: &Scene,
+        surroundings: &Surroundings<'_>,
         solution: &mut Solution,
         fine: &FineMesh,
         options: &Exchange,
         inquiry: &mut Inquiry<'_>,
     ) {
+        let scene = surroundings.scene;
         let projection = Projection::new(fine, solution);
         let is_first = self.coarse.leaves.is_empty();
         if is_first {
-            self.solve_roughly(scene, solution, fine, &projection, options, inquiry);
+            self.solve_roughly(surroundings, solution, fine, &projection, options, inquiry);
         }
-        let coarse = CoarseMesh::new(scene, solution, &self.front);
+        let coarse = CoarseMesh::new(surroundings, solution, &self.front);
         let stand_ins =
             StandIns::new(scene, solution, &coarse.leaves, &coarse.mesh, (&coarse.table, &coarse.looked_at));
-        self.look(scene, solution, &stand_ins.queries, options, STALE, inquiry);
+        self.look(surroundings, solution, &stand_ins.queries, options, STALE, inquiry);
         if inquiry.stopped() {
             self.front = self.coarse.leaves.iter().map(|leaf| leaf.element).collect();
             return;
@@ -116,7 +117,7 @@ impl ReflectedLight {
     /// were it known by the links alone, most of what is seen would have to be looked at again.
     fn solve_roughly(
         &mut self,
-        scene: &Scene,
+        surroundings: &Surroundings<'_>,
         solution: &mut Solution,
         fine: &FineMesh,
         projection: &Projection,
@@ -139,13 +140,13 @@ impl ReflectedLight {
         };
         self.reflecting = light(solution, &correction);
         solution.set_light(projection.planes(&self.reflecting));
-        self.look(scene, solution, &probes, options, STALE, inquiry);
+        self.look(surroundings, solution, &probes, options, STALE, inquiry);
         if inquiry.stopped() {
             return;
         }
         let rows: Vec<&Row> = probes.iter().map(|query| self.row(query, inquiry)).collect();
         for _ in 0..ROUGH_ITERATIONS {
-            let values = Radiosity::of(scene, solution).received(&rows);
+            let values = Radiosity::of(surroundings.scene, solution).received(&rows);
             for ((correction, value), query) in correction.iter_mut().zip(values).zip(&probes) {
                 *correction = value - over_links(solution, query.element, query.position);
             }
@@ -162,23 +163,24 @@ impl ReflectedLight {
     /// The errors of all leaves of the front, by what their probes see. None if the bake is stopped.
     pub fn leaf_errors(
         &mut self,
-        scene: &Scene,
+        surroundings: &Surroundings<'_>,
         solution: &Solution,
         options: &Exchange,
         inquiry: &mut Inquiry<'_>,
     ) -> Option<Vec<LeafError>> {
+        let scene = surroundings.scene;
         let queries: Vec<SampleQuery> = leaf_probes(scene, solution, &self.front, &self.coarse.table)
             .into_iter()
             .map(|query| query.looked_at(scene))
             .collect();
-        self.look(scene, solution, &queries, options, STALE_PROBE, inquiry);
+        self.look(surroundings, solution, &queries, options, STALE_PROBE, inquiry);
         if inquiry.stopped() {
             return None;
         }
         let rows: Vec<&Row> = queries.iter().map(|query| self.row(query, inquiry)).collect();
         let looked: Vec<(SampleQuery, Rgb)> =
             queries.into_iter().zip(Radiosity::of(scene, solution).received(&rows)).collect();
-        let gather = Gather::with_source_error(scene, solution, options.source_error);
+        let gather = Gather::with_source_error(surroundings, solution, options.source_error);
         let probed = looked.chunk_by(|a, b| a.0.element == b.0.element).enumerate().map(|(leaf, probes)| {
             let baked = |query: &SampleQuery| {
                 self.coarse.place(leaf, query).map_or(Rgb::ZERO, |place| self.coarse.at(place, Light::LookedAt))
@@ -209,14 +211,14 @@ impl ReflectedLight {
     /// Finds out what queries see that are not known yet, or were looked at when reflectors were coarser.
     fn look(
         &mut self,
-        scene: &Scene,
+        surroundings: &Surroundings<'_>,
         solution: &Solution,
         queries: &[SampleQuery],
         options: &Exchange,
         stale: f64,
         inquiry: &mut Inquiry<'_>,
     ) {
-        let gather = Gather::with_source_error(scene, solution, options.source_error);
+        let gather = Gather::with_source_error(surroundings, solution, options.source_error);
         // Rays are told by the source error how many they are, and by nothing else.
         if solution.visibility == Visibility::Rays && self.source_error != options.source_error {
             self.rows.clear();

@@ -12,7 +12,7 @@ use glam::{DVec2, DVec3};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use scene::{Bvh, Interpolant, Ray, Rgb, Scene, other_sides};
-use solver::{Cosine, Gather, NodeId, SeenNode, Shafts, Solution, Visibility, hemisphere};
+use solver::{Cosine, Gather, NodeId, SeenNode, Shafts, Solution, Surroundings, Visibility, hemisphere};
 
 use crate::fine_mesh::FineMesh;
 use crate::inquiry::Inquiry;
@@ -60,7 +60,7 @@ impl ResidualPoint {
 /// Measures at a fixed set of points; at the first of them, if the bake is stopped meanwhile. `samples` are the bake's
 /// irradiances at the samples of the fine mesh, `reflecting` what its reflectors send, W·m⁻².
 pub(crate) fn residual(
-    scene: &Scene,
+    surroundings: &Surroundings<'_>,
     solution: &Solution,
     fine: &FineMesh,
     samples: &[Rgb],
@@ -72,9 +72,10 @@ pub(crate) fn residual(
         return Vec::new();
     }
     if solution.visibility == Visibility::Rays {
-        return residual_by_rays(scene, solution, fine, samples, tolerance, inquiry);
+        return residual_by_rays(surroundings, solution, fine, samples, tolerance, inquiry);
     }
-    let gather = Gather::with_even_nodes(scene, solution, STRAYS);
+    let scene = surroundings.scene;
+    let gather = Gather::with_even_nodes(surroundings, solution, STRAYS);
     let bvh = Bvh::of_triangles((0..fine.triangles()).map(|triangle| fine.corners(triangle)).collect());
     let mean = colour_mean(solution.mean_irradiance);
     let misfits = misfits(scene, solution, fine, reflecting);
@@ -140,14 +141,14 @@ pub(crate) fn residual(
 /// The same in a scene whose reflected light is found by rays: each half looks anew, with rays of its own, at what the leaf
 /// elements reflect. It sees the error of interpolants, of the nodes that stood for leaves, and of the bake's own rays.
 fn residual_by_rays(
-    scene: &Scene,
+    surroundings: &Surroundings<'_>,
     solution: &Solution,
     fine: &FineMesh,
     samples: &[Rgb],
     tolerance: f64,
     inquiry: &mut Inquiry<'_>,
 ) -> Vec<ResidualPoint> {
-    let halves = [1, 2].map(|turn| Gather::with_turned_rays(scene, solution, TURNED_ERROR * tolerance, turn));
+    let halves = [1, 2].map(|turn| Gather::with_turned_rays(surroundings, solution, TURNED_ERROR * tolerance, turn));
     inquiry.residuals(&points(fine), |_, (triangle, s, t)| {
         let leaf = &fine.leaves[fine.mesh.triangles[triangle].leaf as usize];
         let position = at(fine.corners(triangle), (s, t));

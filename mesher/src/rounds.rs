@@ -2,8 +2,8 @@
 //! reflectors.
 
 use glam::{DVec2, Vec3};
-use scene::{Baked, Rgb, Scene};
-use solver::{Gather, NodeId, Solution, Visibility};
+use scene::{Baked, Rgb};
+use solver::{Gather, NodeId, Solution, Surroundings, Visibility};
 
 use crate::BakeOptions;
 use crate::claimed_error::LARGEST_REFLECTANCE;
@@ -52,7 +52,7 @@ const BELOW_GUESS: f64 = 0.5;
 
 /// What goes from round to round.
 pub(crate) struct Rounds<'a> {
-    pub scene: &'a Scene,
+    pub surroundings: &'a Surroundings<'a>,
     pub options: &'a BakeOptions,
     pub solution: Solution,
     pub lines: Lines,
@@ -88,7 +88,7 @@ impl Rounds<'_> {
                 source_error: self.source_share * self.options.tolerance,
                 residual: RESIDUAL_SHARE * self.options.tolerance * self.mean * (1.0 - self.reflectance),
             };
-            self.reflected.solve(self.scene, &mut self.solution, &fine, &exchange, &mut self.inquiry);
+            self.reflected.solve(self.surroundings, &mut self.solution, &fine, &exchange, &mut self.inquiry);
             if self.inquiry.stopped() {
                 break;
             }
@@ -97,7 +97,7 @@ impl Rounds<'_> {
                 let samples = self.reflected.irradiance(&self.solution, &fine);
                 self.take_means(&fine, &samples);
             }
-            let errors = self.reflected.leaf_errors(self.scene, &self.solution, &exchange, &mut self.inquiry);
+            let errors = self.reflected.leaf_errors(self.surroundings, &self.solution, &exchange, &mut self.inquiry);
             let Some(errors) = errors else { break };
             self.reflected_errors = errors.iter().map(|error| (error.element, error.error)).collect();
             self.reflected_errors.sort_unstable_by_key(|error| error.0);
@@ -131,7 +131,7 @@ impl Rounds<'_> {
         let most = if self.solution.visibility == Visibility::Rays { LINES_BY_RAYS } else { u32::MAX };
         let lines = (&self.lines, weight, discontinuities.min(most) as usize);
         let dim = DIM * self.options.tolerance;
-        let fine = FineMesh::new(self.scene, &self.solution, lines, dim, &mut self.emitted, &mut self.inquiry);
+        let fine = FineMesh::new(self.surroundings, &self.solution, lines, dim, &mut self.emitted, &mut self.inquiry);
         self.inquiry.hold(held(&self.solution, &fine) + self.lines.bytes());
         fine
     }
@@ -163,7 +163,7 @@ impl Rounds<'_> {
             let part = scene::area_vector(&fine.corners(triangle)).length();
             let polygon = fine.leaves[fine.mesh.triangles[triangle].leaf as usize].polygon;
             arrives += mean * part;
-            reflected += mean * part * self.scene.reflectance(polygon);
+            reflected += mean * part * self.surroundings.scene.reflectance(polygon);
             area += part;
         }
         let (arrives, area) = (arrives.max(Rgb::ZERO), f64::max(area, f64::MIN_POSITIVE));
@@ -222,10 +222,11 @@ impl Rounds<'_> {
             return;
         }
         let BakeOptions { weight, min_weight, tolerance, .. } = *self.options;
-        let (scene, solution) = (self.scene, &self.solution);
+        let (surroundings, solution) = (self.surroundings, &self.solution);
+        let scene = surroundings.scene;
         let least =
             |diameter| min_weight.unwrap_or_else(|| weight.minimum_in_leaf(scene, solution, tolerance, diameter));
-        let gather = Gather::with_source_error(scene, solution, DIM * tolerance);
+        let gather = Gather::with_source_error(surroundings, solution, DIM * tolerance);
         let lines = &mut self.lines;
         self.emitted.with_shafts(leaves, |leaves| lines.search(scene, (solution, &gather), leaves, weight, least));
     }
@@ -256,7 +257,7 @@ impl Rounds<'_> {
         let area = |leaf: NodeId| elements.nodes[leaf as usize].area;
         let total: f64 = leaves.iter().map(|&(leaf, _)| area(leaf)).sum();
         let allowed = (self.share * self.options.tolerance).powi(2) * total;
-        let smallest = SMALLEST_LEAF * self.scene.size();
+        let smallest = SMALLEST_LEAF * self.surroundings.scene.size();
         let weighted: Vec<f64> = leaves
             .iter()
             .map(|&(leaf, error)| {

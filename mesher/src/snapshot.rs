@@ -21,7 +21,7 @@ impl Rounds<'_> {
             irradiance: light[leaf.element as usize].irradiance.as_vec3(),
         };
         Baked {
-            scene: self.scene.clone(),
+            scene: self.surroundings.scene.clone(),
             vertices,
             triangle_errors: self.triangle_errors(fine, &samples),
             samples,

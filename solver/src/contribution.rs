@@ -90,7 +90,7 @@ impl Gather<'_> {
 mod tests {
     use super::*;
     use crate::testing::Builder;
-    use crate::{SolveOptions, solve};
+    use crate::{SolveOptions, Surroundings, solve};
 
     /// A floor, a lamp over it, a plate between the two, and a second, dimmer lamp.
     fn lit_floor() -> Builder {
@@ -117,7 +117,8 @@ mod tests {
     fn sources_sum_up_to_the_irradiance_the_strongest_first() {
         let scene = lit_floor().build();
         let solution = solve(&scene, &SolveOptions::default(), &|_| ());
-        let gather = Gather::new(&scene, &solution);
+        let surroundings = Surroundings::new(&scene, &solution);
+        let gather = Gather::new(&surroundings, &solution);
         for point in [DVec3::new(0.1, 0.2, 0.0), DVec3::new(-1.0, 0.7, 0.0), DVec3::new(1.9, 0.0, 0.0)] {
             let parts = gather.contributions_at(0, point, DVec3::X);
             let whole = gather.irradiance_at(0, point, DVec3::X);
@@ -147,7 +148,8 @@ mod tests {
         let scene = builder.build();
         let solution = solve(&scene, &SolveOptions::default(), &|_| ());
         assert_eq!(solution.visibility, crate::Visibility::Rays);
-        let gather = Gather::new(&scene, &solution);
+        let surroundings = Surroundings::new(&scene, &solution);
+        let gather = Gather::new(&surroundings, &solution);
         for point in [DVec3::new(0.1, 0.2, 0.0), DVec3::new(-1.0, -0.7, 0.0)] {
             let parts = gather.contributions_at(0, point, DVec3::X);
             let whole = gather.irradiance_at(0, point, DVec3::X);

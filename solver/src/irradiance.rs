@@ -8,24 +8,24 @@
 //! What we do differently: blockers in contact with the point enter by their limit ([`Viewpoint::tangent_cone`]).
 
 use std::cell::OnceCell;
-use std::sync::OnceLock;
 
 use glam::DVec3;
 use scene::{Rgb, Scene, luminance};
 
 use crate::backprojection::Viewpoint;
 use crate::clip::{Position, locate};
-use crate::emitter::{Emitter, emitter_tree, emitters};
+use crate::emitter::Emitter;
 use crate::geometry::Geometry;
 use crate::lamp_rays::FaintGroups;
 use crate::leaf_gather::{LeafGather, SeenNode, Source};
 use crate::light_tree::{Horizon, LightTree};
 use crate::polygon_tree::PolygonTree;
-use crate::ray_gather::{RayGather, SMALL_LEAF, rays_for};
+use crate::ray_gather::{RayGather, rays_for};
 use crate::shafts::Shafts;
 use crate::sky_view::SkyView;
 use crate::solid::Solids;
-use crate::solution::{Solution, Visibility};
+use crate::solution::Solution;
+use crate::surroundings::Surroundings;
 use crate::{LinkSource, NodeId};
 
 /// How much light one reflector may misplace at a point, as a fraction of the scene's mean irradiance, where nothing else is
@@ -64,16 +64,16 @@ pub enum Cosine {
 
 /// Answers with the irradiance at points of a solved scene.
 pub struct Gather<'a> {
-    pub(crate) scene: &'a Scene,
     pub(crate) solution: &'a Solution,
-    pub(crate) geometry: Geometry,
-    pub(crate) solids: Solids,
-    pub(crate) tree: PolygonTree,
-    pub(crate) emitters: Vec<Emitter>,
+    pub(crate) scene: &'a Scene,
+    pub(crate) geometry: &'a Geometry,
+    pub(crate) solids: &'a Solids,
+    pub(crate) tree: &'a PolygonTree,
+    pub(crate) emitters: &'a [Emitter],
     /// Where there are no links to say which emitters an element sees.
-    emitter_tree: Option<LightTree>,
-    /// Prepared when a point asks for reflectors first, in a scene where rays find them.
-    rays: OnceLock<RayGather>,
+    emitter_tree: Option<&'a LightTree>,
+    /// Rays to the solution's elements, where they stand in for links.
+    rays: Option<RayGather<'a>>,
     /// Rays from a point, and their turn.
     pub(crate) sampling: (u32, u32),
     opening: Opening,
@@ -92,6 +92,15 @@ enum Opening {
     ByRadiosity(f64),
 }
 
+impl Opening {
+    fn budget(self) -> f64 {
+        match self {
+            Self::ByIrradiance(budget) => budget,
+            Self::ByRadiosity(_) => 0.0,
+        }
+    }
+}
+
 /// What a gather needs to know of a link.
 struct LinkSummary {
     /// The source's polygon and patch.
@@ -105,31 +114,42 @@ struct LinkSummary {
 
 impl<'a> Gather<'a> {
     /// Prepares a gather over a solution of the scene.
-    pub fn new(scene: &'a Scene, solution: &'a Solution) -> Self {
-        Self::with_source_error(scene, solution, SOURCE_ERROR)
+    pub fn new(surroundings: &'a Surroundings<'a>, solution: &'a Solution) -> Self {
+        Self::with_source_error(surroundings, solution, SOURCE_ERROR)
     }
 
     /// The same with a choice of how much light one reflector may misplace at a point, as a fraction of the scene's mean
     /// irradiance.
-    pub fn with_source_error(scene: &'a Scene, solution: &'a Solution, source_error: f64) -> Self {
+    pub fn with_source_error(surroundings: &'a Surroundings<'a>, solution: &'a Solution, source_error: f64) -> Self {
         let budget = source_error * luminance(solution.mean_irradiance);
-        Self::with(scene, solution, Opening::ByIrradiance(budget), (rays_for(source_error), 0))
+        Self::with(surroundings, solution, Opening::ByIrradiance(budget), (rays_for(source_error), 0))
     }
 
     /// The same with rays that have nothing in common with those of another `turn`, and with smaller nodes.
-    pub fn with_turned_rays(scene: &'a Scene, solution: &'a Solution, source_error: f64, turn: u32) -> Self {
+    pub fn with_turned_rays(
+        surroundings: &'a Surroundings<'a>,
+        solution: &'a Solution,
+        source_error: f64,
+        turn: u32,
+    ) -> Self {
         let budget = SMALLER * source_error * luminance(solution.mean_irradiance);
-        Self::with(scene, solution, Opening::ByIrradiance(budget), (rays_for(source_error), turn))
+        Self::with(surroundings, solution, Opening::ByIrradiance(budget), (rays_for(source_error), turn))
     }
 
     /// The same with the same nodes of a reflector for every point that asks: those over which its radiosity strays from a
     /// plane by no more than a fraction of the scene's mean irradiance. Nothing is too dim to be looked at exactly.
-    pub fn with_even_nodes(scene: &'a Scene, solution: &'a Solution, strays: f64) -> Self {
+    pub fn with_even_nodes(surroundings: &'a Surroundings<'a>, solution: &'a Solution, strays: f64) -> Self {
         let opening = Opening::ByRadiosity(strays * luminance(solution.mean_irradiance));
-        Self::with(scene, solution, opening, (rays_for(SOURCE_ERROR), 0))
+        Self::with(surroundings, solution, opening, (rays_for(SOURCE_ERROR), 0))
     }
 
-    fn with(scene: &'a Scene, solution: &'a Solution, opening: Opening, sampling: (u32, u32)) -> Self {
+    fn with(
+        surroundings: &'a Surroundings<'a>,
+        solution: &'a Solution,
+        opening: Opening,
+        sampling: (u32, u32),
+    ) -> Self {
+        let scene = surroundings.scene;
         let radiosity = |polygon| {
             let area = |root: NodeId| solution.elements.nodes[root as usize].area;
             let power = |root: NodeId| luminance(solution.light[root as usize].irradiance) * area(root);
@@ -137,41 +157,30 @@ impl<'a> Gather<'a> {
             luminance(scene.reflectance(polygon)) * total / scene.area(polygon)
         };
         let radiosity = scene.polygon_ids().map(radiosity).collect();
-        let geometry = Geometry::new(scene);
-        let solids = Solids::new(scene, &geometry);
-        let emitters = emitters(scene);
-        let tree = PolygonTree::new(scene);
-        let emitter_tree = (solution.visibility == Visibility::Rays).then(|| emitter_tree(scene, &emitters));
-        let rays = OnceLock::new();
-        let small = SMALL_LEAF * scene.surface_area();
         Self {
-            scene,
             solution,
-            geometry,
-            solids,
-            tree,
-            emitters,
-            emitter_tree,
-            rays,
+            scene,
+            geometry: &surroundings.geometry,
+            solids: &surroundings.solids,
+            tree: &surroundings.tree,
+            emitters: &surroundings.emitters,
+            emitter_tree: surroundings.emitter_tree.as_ref(),
+            rays: RayGather::new(surroundings, sampling, opening.budget()),
             sampling,
             opening,
-            small,
+            small: surroundings.small,
             radiosity,
         }
     }
 
     /// The emitters, in a scene without links.
     pub(crate) fn emitter_tree(&self) -> Option<&LightTree> {
-        self.emitter_tree.as_ref()
+        self.emitter_tree
     }
 
     /// Rays over the solution's elements, where they stand in for links.
-    pub(crate) fn rays(&self) -> Option<&RayGather> {
-        let by_rays = self.solution.visibility == Visibility::Rays && self.solution.reflects();
-        by_rays.then(|| {
-            let (rays, turn) = self.sampling;
-            self.rays.get_or_init(|| RayGather::new(self.scene, self.solution, rays, self.budget(), turn))
-        })
+    pub(crate) fn rays(&self) -> Option<&RayGather<'a>> {
+        self.rays.as_ref()
     }
 
     /// How other polygons touch a point of a polygon, on its front.
@@ -297,10 +306,7 @@ impl<'a> Gather<'a> {
 
     /// Irradiance, luminance, W·m⁻², that one reflector may misplace at a point; nothing where that is not what decides.
     pub fn budget(&self) -> f64 {
-        match self.opening {
-            Opening::ByIrradiance(budget) => budget,
-            Opening::ByRadiosity(_) => 0.0,
-        }
+        self.opening.budget()
     }
 
     /// Whether a node is opened for a point that has a form factor to it, of which the plane misplaces the `curved` part.

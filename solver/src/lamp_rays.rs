@@ -146,7 +146,7 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
     use crate::testing::Builder;
-    use crate::{Gather, Shafts, SolveOptions, form_factor_at, solve};
+    use crate::{Gather, Shafts, SolveOptions, Surroundings, form_factor_at, solve};
 
     /// A square from a corner, its front up or down.
     fn square(corner: DVec3, side: f64, up: bool) -> Vec<DVec3> {
@@ -173,10 +173,12 @@ mod tests {
             let place = DVec3::new(10.0 + x, 10.2, 0.0);
             leaf.light_of_faint_groups(&gather.viewpoint(0, place, DVec3::ZERO, Cosine::Own)).x
         };
-        let bakes = Gather::with_source_error(&scene, &solution, 0.5);
+        let surroundings = Surroundings::new(&scene, &solution);
+        let bakes = Gather::with_source_error(&surroundings, &solution, 0.5);
         let [from, middle, to] = [0.0, 0.25, 0.5].map(|x| light(&bakes, x));
         assert!((from + to - 2.0 * middle).abs() < 1e-12 * middle);
-        let checks = Gather::with_turned_rays(&scene, &solution, 2.0, 1);
+        let surroundings = Surroundings::new(&scene, &solution);
+        let checks = Gather::with_turned_rays(&surroundings, &solution, 2.0, 1);
         let [from, between, to] = [0.0, 0.25, 0.5].map(|x| light(&checks, x));
         assert!((from + to - 2.0 * between).abs() > 1e-6 * between);
         let lamp = |lamp: &Vec<DVec3>| form_factor_at(DVec3::new(10.25, 10.2, 0.0), DVec3::Z, lamp).abs() * PI;
@@ -200,7 +202,8 @@ mod tests {
         let dark = plates.iter().cloned().chain(apart).fold(dark, |scene, outline| scene.polygon(&outline));
         let scene = dark.material(0.0, 1.0).polygon(&lamp).build();
         let solution = solve(&scene, &SolveOptions::default(), &|_| ());
-        let gather = Gather::with_source_error(&scene, &solution, 1e-3);
+        let surroundings = Surroundings::new(&scene, &solution);
+        let gather = Gather::with_source_error(&surroundings, &solution, 1e-3);
         let place = DVec3::new(0.3, 0.2, 0.0);
         let seen = |outline: &Vec<DVec3>| form_factor_at(place, DVec3::Z, outline).abs() * PI;
         let exact = seen(&lamp) - plates.iter().map(seen).sum::<f64>();

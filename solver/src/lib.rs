@@ -33,6 +33,7 @@ mod sky_view;
 mod solid;
 mod solution;
 mod solve;
+mod surroundings;
 #[cfg(test)]
 mod testing;
 mod transport;
@@ -56,4 +57,5 @@ pub use solution::{
     BlockerLists, Convergence, Cut, ElementLight, Interaction, Link, LinkSource, Solution, SolveOptions, Visibility,
 };
 pub use solve::solve;
+pub use surroundings::Surroundings;
 pub use validate::Validation;

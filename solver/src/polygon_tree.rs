@@ -101,8 +101,14 @@ impl PolygonTree {
         self.bvh.is_blocked_among(from, to, |other| !self.is_own(polygon, other) && !passes(other))
     }
 
-    fn is_own(&self, polygon: u32, other: u32) -> bool {
+    /// Whether a polygon is the one that rays start from, or its other side.
+    pub fn is_own(&self, polygon: u32, other: u32) -> bool {
         other == polygon || self.other_sides[polygon as usize] == Some(other)
+    }
+
+    /// Whether a polygon is one of two sides of the same surface.
+    pub fn has_other_side(&self, polygon: u32) -> bool {
+        self.other_sides[polygon as usize].is_some()
     }
 
     fn ascending(&self, enters: impl Fn(DVec3, DVec3) -> bool) -> Vec<u32> {

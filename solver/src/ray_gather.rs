@@ -6,11 +6,12 @@
 use std::f64::consts::PI;
 
 use glam::DVec3;
-use scene::{Bvh, Ray, Scene, luminance, other_sides};
+use scene::Ray;
 
 use crate::backprojection::Viewpoint;
 use crate::lattice::{hemisphere, shift};
 use crate::leaf_gather::SeenNode;
+use crate::surroundings::{PatchTree, Surroundings};
 use crate::{NodeId, Patch, Solution};
 
 /// Rays from a point for a source error of `RAYS_ERROR`. What rays that are spread evenly miss falls with their number to the
@@ -39,53 +40,27 @@ const FEW_RAYS: f64 = 0.25;
 pub(crate) const ASIDE: f64 = 1e-7;
 
 /// Sends rays into a solved scene.
-pub(crate) struct RayGather {
-    bvh: Bvh,
-    /// By triangle of the hierarchy, the patch that it is a part of.
-    patches: Vec<u32>,
-    other_sides: Vec<Option<u32>>,
-    normals: Vec<DVec3>,
-    /// By polygon, luminance of its reflectance.
-    reflectances: Vec<f64>,
-    size: f64,
-    /// Rays from a point of an element that is large enough; which area that is, m²; and which of all possible rays.
+pub(crate) struct RayGather<'a> {
+    surroundings: &'a Surroundings<'a>,
+    patches: &'a PatchTree,
+    /// Rays from a point of an element that is large enough; and which of all possible rays.
     rays: u32,
-    ample: f64,
     turn: u32,
     /// Irradiance, luminance, W·m⁻², that may be misplaced on account of nodes that stand for the leaves that rays meet.
     budget: f64,
 }
 
-impl RayGather {
-    /// Prepares `rays` rays a point over a solution's patches. `budget` is how much light, luminance, W·m⁻²,
-    /// nodes may misplace at a point; rays of another `turn` are others.
-    pub fn new(scene: &Scene, solution: &Solution, rays: u32, budget: f64, turn: u32) -> Self {
-        let elements = &solution.elements;
-        let (mut triangles, mut patches) = (Vec::new(), Vec::new());
-        for (id, patch) in (0..).zip(&elements.patches) {
-            let outline = elements.outline(patch.root);
-            for edge in outline[1..].windows(2) {
-                triangles.push([outline[0], edge[0], edge[1]]);
-                patches.push(id);
-            }
-        }
-        Self {
-            bvh: Bvh::of_triangles(triangles),
-            patches,
-            other_sides: other_sides(scene),
-            normals: scene.polygon_ids().map(|polygon| scene.plane(polygon).normal).collect(),
-            reflectances: scene.polygon_ids().map(|polygon| luminance(scene.reflectance(polygon))).collect(),
-            size: scene.size(),
-            rays,
-            ample: SMALL_LEAF * scene.surface_area(),
-            turn,
-            budget,
-        }
+impl<'a> RayGather<'a> {
+    /// Prepares so many rays a point; none where there are links, or nothing reflects. `budget` is how much light, luminance, W·m⁻²,
+    /// nodes may misplace at a point; rays of another turn are others.
+    pub fn new(surroundings: &'a Surroundings<'a>, (rays, turn): (u32, u32), budget: f64) -> Option<Self> {
+        let patches = surroundings.patches.as_ref()?;
+        Some(Self { surroundings, patches, rays, turn, budget })
     }
 
     /// Rays from each point of an element, at least one.
     pub fn rays_over(&self, solution: &Solution, element: NodeId) -> u32 {
-        let part = (solution.elements.nodes[element as usize].area / self.ample).sqrt();
+        let part = (solution.elements.nodes[element as usize].area / self.surroundings.small).sqrt();
         ((f64::from(self.rays) * part.clamp(FEW_RAYS, 1.0)) as u32).max(1)
     }
 
@@ -99,25 +74,27 @@ impl RayGather {
         seen: &mut Vec<SeenNode>,
     ) {
         let elements = &solution.elements;
+        let Surroundings { geometry, tree, .. } = self.surroundings;
         let first = seen.len();
         let share = 1.0 / f64::from(rays);
-        let from = point.aside(ASIDE * self.size);
+        let from = point.aside(ASIDE * geometry.size);
         let Viewpoint { position, up, normal, .. } = from;
         let shift = shift(point.position, self.turn);
         // About a shading normal some look below the polygon's plane, where nothing is seen.
         for direction in hemisphere(normal, rays, shift).filter(|way| normal == up || up.dot(*way) > 0.0) {
             let meets = |triangle: u32| {
-                let Patch { polygon: met, root, .. } = elements.patches[self.patches[triangle as usize] as usize];
-                !self.is_own(polygon, met)
+                let Patch { polygon: met, root, .. } =
+                    elements.patches[self.patches.patches[triangle as usize] as usize];
+                !tree.is_own(polygon, met)
                     && from.may_meet(elements.outline(root))
-                    && (self.other_sides[met as usize].is_none() || self.normals[met as usize].dot(direction) < 0.0)
+                    && (!tree.has_other_side(met) || geometry.plane(met).normal.dot(direction) < 0.0)
             };
             let ray = Ray { origin: position, direction };
-            let Some(hit) = self.bvh.closest_hit_among(&ray, meets) else { continue };
+            let Some(hit) = self.patches.bvh.closest_hit_among(&ray, meets) else { continue };
             if hit.normal.dot(direction) >= 0.0 {
                 continue; // A back, which is black.
             }
-            let patch = &elements.patches[self.patches[hit.id as usize] as usize];
+            let patch = &elements.patches[self.patches.patches[hit.id as usize] as usize];
             let place = position + direction * hit.distance;
             // By each ray something else: were all that a point sees off by as much, the sum would be as of one such part. What is
             // near fills more of the hemisphere, and all of its light is off in one direction.
@@ -131,16 +108,11 @@ impl RayGather {
         merge(seen, first);
     }
 
-    /// Whether a polygon is the one that rays start from, or its other side.
-    fn is_own(&self, polygon: u32, other: u32) -> bool {
-        other == polygon || self.other_sides[polygon as usize] == Some(other)
-    }
-
     /// How much light, luminance, W·m⁻², is misplaced at a point where a plane stands for what it sees of a node by such a form
     /// factor.
     pub fn misplaced(&self, solution: &Solution, node: NodeId, form_factor: f64) -> f64 {
         let polygon = solution.elements.polygon_of(node).unwrap_or_default();
-        self.reflectances[polygon as usize] * solution.light[node as usize].deviation * form_factor
+        self.surroundings.reflectances[polygon as usize] * solution.light[node as usize].deviation * form_factor
     }
 
     /// What rays are taken to be off by at a point of an element, root mean square, relative to the light over reflectors there.
@@ -234,7 +206,9 @@ mod tests {
             .build();
         let solution = solve(&room, &SolveOptions { link_error: Some(0.02), bounces: None }, &|_| ());
         let (rays, budget) = (1024, 0.05);
-        let gather = RayGather::new(&room, &solution, rays, budget, 0);
+        let surroundings = Surroundings::new(&room, &solution);
+        let patches = PatchTree::new(&solution.elements);
+        let gather = RayGather { surroundings: &surroundings, patches: &patches, rays, turn: 0, budget };
         let mut opened = 0;
         for i in 0..40 {
             let position = DVec3::new(0.55 + 0.03 * f64::from(i), 0.6 + 0.02 * f64::from(i * 7 % 40), 0.0);
@@ -261,7 +235,9 @@ mod tests {
             .cuboid([2.2, 1.3, 0.9], [3.5, 2.2, 1.0], false)
             .build();
         let solution = solve(&room, &SolveOptions { link_error: Some(0.1), bounces: None }, &|_| ());
-        let gather = RayGather::new(&room, &solution, 256, 1e-3, 0);
+        let surroundings = Surroundings::new(&room, &solution);
+        let patches = PatchTree::new(&solution.elements);
+        let gather = RayGather { surroundings: &surroundings, patches: &patches, rays: 256, turn: 0, budget: 1e-3 };
         let floor = solution.patch_roots(4).next().expect("the floor is a patch");
         let looks = (4, gather.rays_over(&solution, floor));
         let (mut sums, mut turned_sums) = (Vec::new(), Vec::new());

@@ -171,8 +171,8 @@ fn mean_irradiance(elements: &Elements, transport: &Transport) -> Rgb {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Gather;
     use crate::testing::Builder;
+    use crate::{Gather, Surroundings};
 
     fn solved(scene: &Scene, link_error: f64, bounces: Option<u32>) -> Solution {
         solve(scene, &SolveOptions { link_error: Some(link_error), bounces }, &|_| ())
@@ -195,7 +195,14 @@ mod tests {
         let solution = solve(&dark, &SolveOptions::default(), &|_| ());
         assert_eq!(solution.mean_irradiance, Rgb::ZERO);
         assert!(solution.convergence.reached);
-        assert_eq!(Gather::new(&dark, &solution).irradiance_at(4, DVec3::new(2.0, 2.0, 0.0), DVec3::ZERO), Rgb::ZERO);
+        assert_eq!(
+            Gather::new(&Surroundings::new(&dark, &solution), &solution).irradiance_at(
+                4,
+                DVec3::new(2.0, 2.0, 0.0),
+                DVec3::ZERO
+            ),
+            Rgb::ZERO
+        );
     }
 
     /// Closed enclosure of uniform exitance M and reflectance ρ: B = M/(1−ρ) everywhere.
@@ -234,7 +241,8 @@ mod tests {
     fn visible_fragments_close_the_hemisphere() {
         let room = furnished(0.0, 1.0);
         let solution = solved(&room, 0.5, Some(0));
-        let gather = Gather::new(&room, &solution);
+        let surroundings = Surroundings::new(&room, &solution);
+        let gather = Gather::new(&surroundings, &solution);
         for (x, y) in [(2.8, 1.7), (0.65, 0.9), (0.7, 0.5), (1.51, 1.0), (1.1, 1.1), (3.9, 0.1), (4.0, 0.0)] {
             let position = DVec3::new(x, y, 0.0);
             let irradiance = gather.irradiance_at(4, position, DVec3::new(2.0, 1.5, 0.0) - position);
@@ -260,7 +268,8 @@ mod tests {
         room.materials.push(scene::Material { radiance: Rgb::ZERO, ..room.materials[0].clone() });
         room.polygons[4].material = 2;
         let solution = solved(&room, 0.05, None);
-        let gather = Gather::new(&room, &solution);
+        let surroundings = Surroundings::new(&room, &solution);
+        let gather = Gather::new(&surroundings, &solution);
         let inside = |x: f64, y: f64| (1.0..=2.0).contains(&x) && (1.0..=2.2).contains(&y);
         let centre = DVec3::new(1.5, 1.6, 0.0);
         for i in 0..=40 {
@@ -289,7 +298,9 @@ mod tests {
         let room = furnished(0.5, 0.3);
         let at = |bounces| {
             let solution = solved(&room, 0.01, Some(bounces));
-            Gather::new(&room, &solution).irradiance_at(4, DVec3::new(3.0, 0.5, 0.0), DVec3::ZERO).x
+            Gather::new(&Surroundings::new(&room, &solution), &solution)
+                .irradiance_at(4, DVec3::new(3.0, 0.5, 0.0), DVec3::ZERO)
+                .x
         };
         let exitance = 0.3 * std::f64::consts::PI;
         // With M everywhere every bounce multiplies by ρ: 1, 1 + ρ, 1 + ρ + ρ², …
@@ -318,7 +329,9 @@ mod tests {
             .build();
         let at = |link_error: f64| {
             let solution = solved(&room, link_error, None);
-            Gather::new(&room, &solution).irradiance_at(4, DVec3::new(0.3, 0.2, 0.0), DVec3::ZERO).x
+            Gather::new(&Surroundings::new(&room, &solution), &solution)
+                .irradiance_at(4, DVec3::new(0.3, 0.2, 0.0), DVec3::ZERO)
+                .x
         };
         let best = at(0.005);
         let errors: Vec<f64> = [1.0, 0.1].map(|link_error| (at(link_error) / best - 1.0).abs()).to_vec();

@@ -3,7 +3,7 @@
 use glam::DVec3;
 use mesher::{Bake, BakeOptions, Control};
 use scene::{Baked, Bvh, Material, Polygon, Rgb, SAMPLE_BARYCENTRICS, Scene, centroid};
-use solver::{Gather, Solution, SolveOptions};
+use solver::{Gather, Solution, SolveOptions, Surroundings};
 
 /// How far from its surface a point may lie, metres: a bake's vertices are rounded to f32.
 const REACH: f64 = 1e-5;
@@ -126,7 +126,8 @@ impl Lit {
     /// Irradiance at points with normals, W·m⁻², gathered at each as `probe --method gather` does. Not a number where there
     /// is no surface.
     pub fn gather(&self, points: impl IntoIterator<Item = (DVec3, DVec3)>) -> Vec<Rgb> {
-        let gather = Gather::new(&self.scene, &self.bake.solution);
+        let surroundings = Surroundings::new(&self.scene, &self.bake.solution);
+        let gather = Gather::new(&surroundings, &self.bake.solution);
         let at = |(position, normal): (DVec3, DVec3)| {
             let Some(hit) = self.bvh.nearest_surface(position, normal, REACH) else { return Rgb::NAN };
             gather.irradiance_at(hit.id, position, centroid(&self.scene.outline(hit.id)) - position)

@@ -54,7 +54,7 @@ fn direct(scene: &Scene, position: DVec3, normal: DVec3) -> f64 {
     let mut scene = scene.clone();
     shade(&mut scene, 0, normal);
     let solution = solve(&scene, &SolveOptions { bounces: Some(0), ..SolveOptions::default() }, &|_| ());
-    Gather::new(&scene, &solution).irradiance_at(0, position, DVec3::ZERO).x
+    Gather::new(&Surroundings::new(&scene, &solution), &solution).irradiance_at(0, position, DVec3::ZERO).x
 }
 
 #[track_caller]
@@ -147,7 +147,8 @@ fn the_light_that_a_room_keeps_does_not_depend_on_shading_normals() {
     shade(&mut room, 4, turned(angle, 1.0));
     let solution = solve(&room, &SolveOptions { link_error: Some(1e-4), bounces: None }, &|_| ());
     let kept = PI * 0.2 / (1.0 - reflectance);
-    let gather = Gather::new(&room, &solution);
+    let surroundings = Surroundings::new(&room, &solution);
+    let gather = Gather::new(&surroundings, &solution);
     for (x, y) in [(0.4, 1.3), (1.9, 0.2), (1.0, 2.9)] {
         let found = gather.irradiance_at(4, DVec3::new(x, y, 0.0), DVec3::ZERO);
         assert!((found / kept - Rgb::splat((1.0 + angle.cos()) / 2.0)).abs().max_element() < 1e-3, "{found}");

@@ -8,7 +8,7 @@ use scene::{CieSky, Environment, LatLongMap, Sky, UpAxis};
 use super::*;
 use crate::form_factor::form_factor_at;
 use crate::testing::Builder;
-use crate::{SkyCells, Solution, SolveOptions, solve};
+use crate::{SkyCells, Solution, SolveOptions, Surroundings, solve};
 
 fn map(width: u32, height: u32, texels: Vec<Vec3>) -> Environment {
     Environment { sky: Sky::Map(LatLongMap { width, height, texels }), up: UpAxis::Z, rotation: 0.0, scale: 1.0 }
@@ -38,7 +38,7 @@ fn plate(normal: DVec3) -> Builder {
 }
 
 fn at(scene: &Scene, solution: &Solution, polygon: u32, position: DVec3) -> Rgb {
-    Gather::new(scene, solution).irradiance_at(polygon, position, DVec3::ZERO)
+    Gather::new(&Surroundings::new(scene, solution), solution).irradiance_at(polygon, position, DVec3::ZERO)
 }
 
 #[test]
@@ -197,7 +197,8 @@ fn through_openings_short_patches_see_the_window() {
     let (scene, mut solution) = lit(builder, uniform());
     let tree = PolygonTree::new(&scene);
     solution.openings = Some(crate::Openings::new(&scene, &tree, &solution.elements, &solution.sky));
-    let gather = Gather::new(&scene, &solution);
+    let surroundings = Surroundings::new(&scene, &solution);
+    let gather = Gather::new(&surroundings, &solution);
     let off = |tile: u32| {
         let place = scene::centroid(&scene.outline(tile));
         let expected = PI * form_factor_at(place, DVec3::Z, &window);
