@@ -16,14 +16,9 @@ use crate::inquiry::Inquiry;
 use crate::lines::Lines;
 use crate::probe::{colour_mean, probe_point};
 use crate::samples::ByQuery;
-use crate::small_patch::middle_of_small;
 use crate::{
     Leaf, LeafSegment, Mesh, RankedLine, SampleQuery, SampleTable, Weight, edge_table, leaf_meshes, rank, sample_table,
 };
-
-/// Length of patches, as a fraction of the scene's size, below which light from emitters is taken for the same all over them
-/// until a probe says otherwise. Larger shows facets where light changes within them.
-const SMALL_PATCH: f64 = 0.01;
 
 /// A mesh of all leaves, and what emitters send to its samples.
 #[derive(Default)]
@@ -70,20 +65,17 @@ impl FineMesh {
         let mut fine = Self { leaves, lines, mesh, table, ..Self::default() };
         let probes: Vec<SampleQuery> =
             (0..fine.triangles()).map(|triangle| fine.probe_query(triangle).looked_at(scene)).collect();
-        let small = SMALL_PATCH * scene.size();
-        let stands_in = |query: &SampleQuery| middle_of_small(solution, query, small).unwrap_or(*query);
-        let queries: Vec<SampleQuery> = fine.table.queries.iter().map(stands_in).collect();
         let (samples, shaded) = fine.table.shaded(scene);
-        known.find(&gather, queries.iter().chain(&shaded).chain(&probes), inquiry);
+        known.find(&gather, fine.table.queries.iter().chain(&shaded).chain(&probes), inquiry);
         known.shafts.retain(|&element, _| solution.elements.is_leaf(element));
         let shown = |mut own: Vec<Rgb>, by_shading: Vec<Rgb>| {
             samples.iter().zip(by_shading).for_each(|(&sample, light)| own[sample] = light);
             own
         };
-        fine.emitted = known.at(solution, &queries, inquiry);
+        fine.emitted = known.at(solution, &fine.table.queries, inquiry);
         fine.shown = shown(fine.emitted.clone(), known.at(solution, &shaded, inquiry));
         if inquiry.has_sky() {
-            fine.shown_sky = shown(known.sky_at(&queries, inquiry), known.sky_at(&shaded, inquiry));
+            fine.shown_sky = shown(known.sky_at(&fine.table.queries, inquiry), known.sky_at(&shaded, inquiry));
         }
         fine.probed = known.at(solution, &probes, inquiry);
         fine

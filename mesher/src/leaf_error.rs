@@ -3,8 +3,9 @@
 use std::collections::HashMap;
 
 use glam::{DVec2, DVec3};
-use scene::{Rgb, Scene};
-use solver::{Cosine, Fan, NodeId, Solution, Visibility};
+use rayon::prelude::*;
+use scene::Rgb;
+use solver::{Cosine, Fan, NodeId, Solution, Surroundings, Visibility};
 
 use crate::probe::colour_mean;
 use crate::{SampleQuery, SampleTable};
@@ -21,6 +22,10 @@ const BETWEEN: [f64; 3] = [0.6, 0.3, 0.1];
 /// How far from a contact one more probe lies, as a part of the way to the middle of the leaf. Nearer ones see a crevice that no
 /// division mends, farther ones miss what is special to the contact.
 const BESIDE: f64 = 0.15;
+
+/// Probes below what stands over a leaf, at most. One finds a lamp under a ceiling, whose leaves are larger than what it darkens;
+/// where more stands over a leaf its parts have one each.
+const FEET: usize = 1;
 
 /// How many times the square of what is expected rays are believed to scatter by at most: more, and it is not scatter that all
 /// leaves are off by.
@@ -100,12 +105,12 @@ fn more_scatter(leaves: &[ProbedLeaf]) -> f64 {
 /// large ones and one more beside a contact, where most of what is wrong is. `table` has the samples of a mesh of the
 /// elements.
 pub(crate) fn leaf_probes(
-    scene: &Scene,
+    surroundings: &Surroundings<'_>,
     solution: &Solution,
     elements: &[NodeId],
     table: &SampleTable,
 ) -> Vec<SampleQuery> {
-    let area = scene.surface_area() / elements.len() as f64;
+    let area = surroundings.scene.surface_area() / elements.len() as f64;
     let nodes = &solution.elements.nodes;
     let count = |element: NodeId| match solution.visibility {
         Visibility::Links => 1,
@@ -122,8 +127,19 @@ pub(crate) fn leaf_probes(
         let position = positions[element as usize % positions.len()].lerp(nodes[element as usize].centre, BESIDE);
         Some(SampleQuery { position, ..probe(solution, element, 0) })
     };
-    let of = |&element: &NodeId| (0..count(element)).map(move |i| probe(solution, element, i)).chain(beside(element));
-    elements.iter().flat_map(of).collect()
+
+    let below = |element: NodeId| {
+        let feet = match solution.visibility {
+            Visibility::Links => Vec::new(),
+            Visibility::Rays => surroundings.feet(solution, element, FEET),
+        };
+        feet.into_iter().map(move |position| SampleQuery { position, ..probe(solution, element, 0) })
+    };
+    let of = |&element: &NodeId| {
+        let anywhere = (0..count(element)).map(|i| probe(solution, element, i));
+        anywhere.chain(beside(element)).chain(below(element)).collect::<Vec<_>>()
+    };
+    elements.par_iter().flat_map_iter(of).collect()
 }
 
 /// The point number `i` at which an element is probed. It depends on the element alone: a finer neighbour changes the
@@ -200,7 +216,7 @@ mod tests {
             SampleQuery { position: DVec3::new(7e-3, 0.0, 0.0), inward: DVec3::Y, ..probe(&solution, strip, 0) };
         let table = SampleTable { queries: vec![contact], triangles: Vec::new() };
         let count = |table: &SampleTable| {
-            let probes = leaf_probes(&scene, &solution, &leaves, table);
+            let probes = leaf_probes(&Surroundings::new(&scene, &solution), &solution, &leaves, table);
             assert!(probes.len() <= 2 * leaves.len() + table.queries.len());
             assert!(probes.iter().all(|probe| probe.inward == DVec3::ZERO));
             [strip, large].map(|element| probes.iter().filter(|probe| probe.element == element).count())
@@ -208,7 +224,7 @@ mod tests {
         let [alone, many] = count(&SampleTable::default());
         assert!(alone < many && many <= MOST_PROBES as usize, "{alone} {many}");
         assert_eq!(count(&table), [alone + 1, many]);
-        let probes = leaf_probes(&scene, &solution, &leaves, &table);
+        let probes = leaf_probes(&Surroundings::new(&scene, &solution), &solution, &leaves, &table);
         let of_strip: Vec<&SampleQuery> = probes.iter().filter(|probe| probe.element == strip).collect();
         let beside = of_strip[alone].position;
         assert!(beside.distance(contact.position.lerp(solution.elements.nodes[strip as usize].centre, BESIDE)) < 1e-9);

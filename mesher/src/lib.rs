@@ -27,7 +27,6 @@ mod reflected_light;
 mod residual;
 mod rounds;
 mod samples;
-mod small_patch;
 mod snapshot;
 mod stand_ins;
 #[cfg(test)]

@@ -169,7 +169,7 @@ impl ReflectedLight {
         inquiry: &mut Inquiry<'_>,
     ) -> Option<Vec<LeafError>> {
         let scene = surroundings.scene;
-        let queries: Vec<SampleQuery> = leaf_probes(scene, solution, &self.front, &self.coarse.table)
+        let queries: Vec<SampleQuery> = leaf_probes(surroundings, solution, &self.front, &self.coarse.table)
             .into_iter()
             .map(|query| query.looked_at(scene))
             .collect();
