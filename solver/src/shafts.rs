@@ -137,11 +137,11 @@ impl<'a> Gather<'a> {
             let source = emitter.polygons[0];
             let (source, facing) = (self.geometry.outline(source), self.geometry.plane(source));
             match facing_parts(outline, plane, source, &facing, tolerance) {
-                Some([near, far]) => self.tree.in_shaft(&self.geometry, &Shaft::between(&near, &far)),
+                Some([near, far]) => self.tree.in_shaft(self.geometry, &Shaft::between(&near, &far)),
                 None => Stands::All,
             }
         } else if emitter.body.iter().any(|&corner| plane.distance(corner) > tolerance) {
-            self.tree.in_shaft(&self.geometry, &Shaft::towards(outline, &emitter.body))
+            self.tree.in_shaft(self.geometry, &Shaft::towards(outline, &emitter.body))
         } else {
             Stands::All
         }
