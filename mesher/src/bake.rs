@@ -41,8 +41,9 @@ pub struct BakeOptions {
 /// with more a first round seldom does, with less it takes leaves that nobody asked for.
 const FIRST_SHARE: f64 = 0.36;
 
-/// The same in a scene whose reflected light is found by rays: what these scatter by is no bias, and does not add up.
-const FIRST_SHARE_BY_RAYS: f64 = 0.6;
+/// The same in a scene whose reflected light is found by rays: what these scatter by comes on top, and probes of a furnished room
+/// miss more.
+const FIRST_SHARE_BY_RAYS: f64 = 0.33;
 
 /// What the error is aimed at where a round has missed the tolerance, as a part of the tolerance; and by how much a share
 /// shrinks for it at most and at least. Less divides too much, more asks for one round more.

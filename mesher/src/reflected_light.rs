@@ -178,16 +178,23 @@ impl ReflectedLight {
             return None;
         }
         let rows: Vec<&Row> = queries.iter().map(|query| self.row(query, inquiry)).collect();
-        let looked: Vec<(SampleQuery, Rgb)> =
-            queries.into_iter().zip(Radiosity::of(scene, solution).received(&rows)).collect();
+        let radiosity = Radiosity::of(scene, solution);
+        let spreads: Vec<f64> = rows.par_iter().map(|row| radiosity.spread(row)).collect();
+        let looked: Vec<(SampleQuery, Rgb, f64)> = queries
+            .into_iter()
+            .zip(radiosity.received(&rows))
+            .zip(spreads)
+            .map(|((query, exact), spread)| (query, exact, spread))
+            .collect();
         let gather = Gather::with_source_error(surroundings, solution, options.source_error);
         let probed = looked.chunk_by(|a, b| a.0.element == b.0.element).enumerate().map(|(leaf, probes)| {
             let baked = |query: &SampleQuery| {
                 self.coarse.place(leaf, query).map_or(Rgb::ZERO, |place| self.coarse.at(place, Light::LookedAt))
             };
-            let both: Vec<[Rgb; 2]> = probes.iter().map(|(query, exact)| [baked(query), *exact]).collect();
+            let both: Vec<[Rgb; 2]> = probes.iter().map(|(query, exact, _)| [baked(query), *exact]).collect();
             let element = probes[0].0.element;
-            ProbedLeaf::new(element, &both, gather.scatter(element))
+            let spread = probes.iter().map(|probe| probe.2).sum::<f64>() / probes.len() as f64;
+            ProbedLeaf::new(element, &both, spread * gather.scatter(element))
         });
         Some(leaf_errors(&probed.collect::<Vec<_>>()))
     }
@@ -331,6 +338,21 @@ impl Radiosity {
             [light.irradiance, light.gradient_u, light.gradient_v].map(|part| (reflectance * part).as_vec3())
         };
         Self((0..).zip(&solution.light).map(node).collect())
+    }
+
+    /// How much what a row sees differs by direction: the standard deviation of its radiosity, relative to its mean.
+    fn spread(&self, row: &Row) -> f64 {
+        let [mut all, mut sum, mut square] = [0.0; 3];
+        for seen in row {
+            let radiosity = f64::from(self.0[seen.node as usize][0].element_sum());
+            let part = f64::from(seen.form_factor);
+            all += part;
+            sum += part * radiosity;
+            square += part * radiosity * radiosity;
+        }
+        // What meets nothing sees the dark.
+        let variance = square * all.max(1.0) - sum * sum;
+        if sum > 0.0 { variance.max(0.0).sqrt() / sum } else { 0.0 }
     }
 
     /// What rows receive, W·m⁻².

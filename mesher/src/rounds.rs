@@ -22,15 +22,20 @@ const AIM: f64 = 0.6;
 /// Meshes in one round at most. Each divides what the last one found wanting.
 const MESHES: u32 = 12;
 
-/// The same where reflected light is found by rays, unless what is left to divide is less than a part of all leaves: a few are
-/// found wanting for what they are, many by chance.
+/// Where reflected light is found by rays, from this mesh on no more than a part of all leaves is divided, and that if they hold so
+/// much of the error's square: a few are found wanting for what they are, many by chance.
 const MESHES_BY_RAYS: u32 = 4;
 const FEW: usize = 50;
+const MUCH: f64 = 0.5;
 
 /// Where rays find the light, leaves are divided down to this part of the allowed square even if the whole keeps it, as long as
 /// they are few, and meshes too: in a hall one leaf in 300, over a lamp, holds more of the error than all boxes. Less divides by
 /// chance, more leaves what costs next to nothing to mend.
 const CHEAP: f64 = 0.25;
+
+/// What light from emitters may use up of the share of reflected light, where rays find that: a sample of emitters costs a few
+/// rays, one of reflectors two hundred.
+const EMITTED_BY_RAYS: f64 = 0.7;
 
 /// Discontinuities that a leaf follows at most where links have not told them: a leaf that is wanting is divided besides. Ten
 /// double the triangles of a hall, and mend no more.
@@ -108,12 +113,11 @@ impl Rounds<'_> {
                     (error.element, error.error / own.max(self.mean))
                 })
                 .collect();
-            let (divided, excess) = self.wanting(&leaves, mesh);
+            let is_late = self.solution.visibility == Visibility::Rays && mesh >= MESHES_BY_RAYS;
+            let most = if is_late { leaves.len() / FEW } else { usize::MAX };
+            let (divided, excess) = self.wanting(&leaves, self.share, mesh, most);
             self.inquiry.expect_division(excess);
-            let by_chance = self.solution.visibility == Visibility::Rays
-                && mesh >= MESHES_BY_RAYS
-                && divided.len() * FEW > leaves.len();
-            if divided.is_empty() || by_chance || mesh == MESHES || fine.triangles() > self.options.max_triangles {
+            if divided.is_empty() || mesh == MESHES || fine.triangles() > self.options.max_triangles {
                 break;
             }
             if self.reflected.divide(&mut self.solution, &divided)
@@ -202,7 +206,7 @@ impl Rounds<'_> {
             }
             leaves.iter_mut().for_each(|leaf| leaf.1 = leaf.1.sqrt());
             self.show(&fine);
-            let (divided, _) = self.wanting(&leaves, mesh);
+            let (divided, _) = self.wanting(&leaves, self.share_of_emitted(), mesh, usize::MAX);
             if divided.is_empty() || fine.triangles() > self.options.max_triangles {
                 break;
             }
@@ -250,13 +254,22 @@ impl Rounds<'_> {
             .collect()
     }
 
-    /// Of elements with their relative errors on a round's mesh of that number, those that are to be divided so that this round's
-    /// share is kept, or more if they are few, ascending; and the error of all in such shares, at least 1.
-    fn wanting(&self, leaves: &[(NodeId, f64)], mesh: u32) -> (Vec<NodeId>, f64) {
+    /// The share of the tolerance that light from emitters may use up in this round.
+    fn share_of_emitted(&self) -> f64 {
+        match self.solution.visibility {
+            Visibility::Links => self.share,
+            Visibility::Rays => self.share * EMITTED_BY_RAYS,
+        }
+    }
+
+    /// Of elements with their relative errors on a round's mesh of that number, those that are to be divided so that a share of
+    /// the tolerance is kept, or more if they are few, ascending; and the error of all in such shares, at least 1. Where more than
+    /// `most` are wanting, the worst of them, if these hold much of the error.
+    fn wanting(&self, leaves: &[(NodeId, f64)], share: f64, mesh: u32, most: usize) -> (Vec<NodeId>, f64) {
         let elements = &self.solution.elements;
         let area = |leaf: NodeId| elements.nodes[leaf as usize].area;
         let total: f64 = leaves.iter().map(|&(leaf, _)| area(leaf)).sum();
-        let allowed = (self.share * self.options.tolerance).powi(2) * total;
+        let allowed = (share * self.options.tolerance).powi(2) * total;
         let smallest = SMALLEST_LEAF * self.surroundings.scene.size();
         let weighted: Vec<f64> = leaves
             .iter()
@@ -268,13 +281,20 @@ impl Rounds<'_> {
         let square = weighted.iter().sum::<f64>();
         let by_rays = self.solution.visibility == Visibility::Rays;
         let cheap = if by_rays && mesh < MESHES_BY_RAYS { worst(&weighted, CHEAP * allowed) } else { Vec::new() };
-        let chosen = if !cheap.is_empty() && cheap.len() * FEW <= leaves.len() {
+        let mut chosen = if !cheap.is_empty() && cheap.len() * FEW <= leaves.len() {
             cheap
         } else if square > allowed {
             worst(&weighted, AIM * allowed)
         } else {
             Vec::new()
         };
+        if chosen.len() > most {
+            chosen.sort_by(|&a, &b| weighted[b].total_cmp(&weighted[a]).then(a.cmp(&b)));
+            chosen.truncate(most);
+            if chosen.iter().map(|&i| weighted[i]).sum::<f64>() < MUCH * square {
+                chosen.clear();
+            }
+        }
         if chosen.is_empty() {
             return (Vec::new(), 1.0);
         }

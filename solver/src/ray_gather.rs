@@ -16,12 +16,12 @@ use crate::{NodeId, Patch, Solution};
 
 /// Rays from a point for a source error of `RAYS_ERROR`. What rays that are spread evenly miss falls with their number to the
 /// power of −3/4.
-const RAYS: f64 = 256.0;
+const RAYS: f64 = 200.0;
 const RAYS_ERROR: f64 = 0.0036;
 
 /// What a single ray would be off by, relative to the light over reflectors: a guess that suits a furnished room, not a measured
 /// figure. Less divides leaves for what rays scatter by, more leaves errors of that size alone.
-const SCATTER: f64 = 0.6;
+const SCATTER: f64 = 0.75;
 
 /// Rays from a point at least and at most.
 const LEAST_RAYS: f64 = 64.0;
