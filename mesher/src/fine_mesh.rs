@@ -63,8 +63,11 @@ impl FineMesh {
         let gather = Gather::with_source_error(surroundings, solution, dim);
         let table = sample_table(scene, &leaves, &mesh, &|polygon, position| gather.contact(polygon, position));
         let mut fine = Self { leaves, lines, mesh, table, ..Self::default() };
-        let probes: Vec<SampleQuery> =
-            (0..fine.triangles()).map(|triangle| fine.probe_query(triangle).looked_at(scene)).collect();
+        let probes: Vec<SampleQuery> = (0..fine.triangles())
+            .into_par_iter()
+            .with_min_len(256)
+            .map(|triangle| fine.probe_query(triangle).looked_at(scene))
+            .collect();
         let (samples, shaded) = fine.table.shaded(scene);
         known.find(&gather, fine.table.queries.iter().chain(&shaded).chain(&probes), inquiry);
         known.shafts.retain(|&element, _| solution.elements.is_leaf(element));
@@ -95,6 +98,8 @@ impl FineMesh {
     /// W·m⁻² averaged over the colours as a root mean square; and the exact light there, averaged over the colours.
     pub fn probe_emitted(&self) -> Vec<(f64, f64)> {
         (0..self.triangles())
+            .into_par_iter()
+            .with_min_len(256)
             .map(|triangle| {
                 let samples = self.table.triangles[triangle].map(|sample| self.shown[sample as usize]);
                 let (s, t) = probe_point(self.probe_number(triangle));

@@ -60,7 +60,7 @@ pub(crate) struct ProbedLeaf {
 
 impl ProbedLeaf {
     /// From what the mesh says at each probe, and what is exact, W·m⁻². `scatter` is what rays at a point are taken to be off
-    /// by, relative to the light.
+    /// by, relative to the light over reflectors.
     pub fn new(element: NodeId, probes: &[[Rgb; 2]], scatter: f64) -> Self {
         let count = probes.len() as f64;
         let irradiance = probes.iter().map(|[_, exact]| colour_mean(*exact)).sum::<f64>() / count;

@@ -4,6 +4,7 @@
 //! A far point cannot tell the two apart; a near one sees no step within the leaf.
 
 use glam::{DVec2, DVec3};
+use rayon::prelude::*;
 use scene::Rgb;
 use solver::{ElementLight, NodeId, Solution};
 
@@ -43,12 +44,12 @@ impl Projection {
             });
             LeafWeights { element: leaf.element, weights: plane_weights(triangles) }
         };
-        Self { leaves: fine.leaves.iter().enumerate().map(leaf).collect() }
+        Self { leaves: fine.leaves.par_iter().enumerate().map(leaf).collect() }
     }
 
     /// The planes of all leaves for given values of the samples, W·m⁻².
-    pub fn planes<'a>(&'a self, samples: &'a [Rgb]) -> impl Iterator<Item = (NodeId, ElementLight)> + 'a {
-        self.leaves.iter().map(|leaf| {
+    pub fn planes(&self, samples: &[Rgb]) -> Vec<(NodeId, ElementLight)> {
+        let plane = |leaf: &LeafWeights| {
             let mut light = ElementLight::default();
             for &(sample, mean, gradient) in &leaf.weights {
                 let value = samples[sample as usize];
@@ -59,7 +60,8 @@ impl Projection {
             // A plane that falls below zero within the leaf is no light: less steep, it keeps its mean.
             light.irradiance = light.irradiance.max(Rgb::ZERO);
             (leaf.element, light)
-        })
+        };
+        self.leaves.par_iter().with_min_len(64).map(plane).collect()
     }
 }
 

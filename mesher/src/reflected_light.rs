@@ -187,7 +187,8 @@ impl ReflectedLight {
             .map(|((query, exact), spread)| (query, exact, spread))
             .collect();
         let gather = Gather::with_source_error(surroundings, solution, options.source_error);
-        let probed = looked.chunk_by(|a, b| a.0.element == b.0.element).enumerate().map(|(leaf, probes)| {
+        let of_leaves: Vec<&[(SampleQuery, Rgb, f64)]> = looked.chunk_by(|a, b| a.0.element == b.0.element).collect();
+        let probed = of_leaves.par_iter().enumerate().map(|(leaf, probes)| {
             let baked = |query: &SampleQuery| {
                 self.coarse.place(leaf, query).map_or(Rgb::ZERO, |place| self.coarse.at(place, Light::LookedAt))
             };
@@ -332,12 +333,12 @@ struct Radiosity(Vec<[Vec3; 3]>);
 
 impl Radiosity {
     fn of(scene: &Scene, solution: &Solution) -> Self {
-        let node = |(node, light): (u32, &ElementLight)| {
-            let polygon = solution.elements.polygon_of(node);
+        let node = |(node, light): (usize, &ElementLight)| {
+            let polygon = solution.elements.polygon_of(node as u32);
             let reflectance = polygon.map_or(Rgb::ZERO, |polygon| scene.reflectance(polygon));
             [light.irradiance, light.gradient_u, light.gradient_v].map(|part| (reflectance * part).as_vec3())
         };
-        Self((0..).zip(&solution.light).map(node).collect())
+        Self(solution.light.par_iter().enumerate().with_min_len(256).map(node).collect())
     }
 
     /// How much what a row sees differs by direction: the standard deviation of its radiosity, relative to its mean.
@@ -369,7 +370,7 @@ impl Radiosity {
 
 fn total(coarse: &CoarseMesh, light: Light, emitted: &[Rgb], places: &[Option<Place>]) -> Vec<Rgb> {
     let reflected = |place: &Option<Place>| place.map_or(Rgb::ZERO, |place| coarse.at(place, light));
-    emitted.iter().zip(places).map(|(&emitted, place)| emitted + reflected(place)).collect()
+    emitted.par_iter().zip(places).with_min_len(256).map(|(&emitted, place)| emitted + reflected(place)).collect()
 }
 
 /// The largest change but for as many that are larger.
@@ -391,6 +392,17 @@ pub(crate) fn offset(solution: &Solution, element: NodeId, position: DVec3) -> D
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn light_that_differs_by_direction_is_spread() {
+        let radiosity = Radiosity([0.0, 3.0, 3.0].map(|light| [Vec3::splat(light), Vec3::ZERO, Vec3::ZERO]).to_vec());
+        let seen = |node: u32, form_factor: f32| Seen { node, form_factor, offset: [0.0; 2] };
+        let spread = |row: &[Seen]| radiosity.spread(row);
+        assert_eq!([spread(&[]), spread(&[seen(0, 1.0)]), spread(&[seen(1, 0.5), seen(2, 0.5)])], [0.0; 3]);
+        assert_eq!(spread(&[seen(0, 0.5), seen(1, 0.25), seen(2, 0.25)]), 1.0);
+        assert_eq!(spread(&[seen(1, 0.5)]), 1.0, "the rest is dark");
+        assert!(spread(&[seen(0, 0.9), seen(1, 0.1)]) > 2.9);
+    }
 
     #[test]
     fn the_largest_moves_may_be_passed_over() {

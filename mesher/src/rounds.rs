@@ -70,7 +70,7 @@ pub(crate) struct Rounds<'a> {
     pub mean: f64,
     /// Whether that is but a guess.
     pub is_guessed: bool,
-    /// The share of the tolerance that each of the two kinds of light may use up in this round.
+    /// The share of the tolerance that reflected light may use up in this round, and the other kind as much, but where rays find it.
     pub share: f64,
     /// The part of the tolerance that a row may misplace on account of each reflector.
     pub source_share: f64,

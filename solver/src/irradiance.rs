@@ -298,8 +298,8 @@ impl<'a> Gather<'a> {
         reflectance * solution.light[node as usize].deviation * form_factor
     }
 
-    /// What the light over reflectors at a point of an element scatters by, root mean square, relative to it: nothing but where
-    /// rays find it.
+    /// What the light over reflectors at a point of an element scatters by, root mean square, in standard deviations of the light
+    /// that it sees by direction: nothing but where rays find it.
     pub fn scatter(&self, element: NodeId) -> f64 {
         self.rays().map_or(0.0, |rays| rays.scatter(self.solution, element))
     }

