@@ -116,7 +116,7 @@ fn memory_is_counted_and_kept_within_its_limit() {
         assert!(one == two && one.answers.is_none(), "{limit}");
         one.baked.validate().unwrap();
         assert!(!one.baked.error.holds);
-        // A mesh is counted once it is there.
+        // The first mesh is counted once it is there, finer ones are foreseen.
         assert!(limit == 0 || one.statistics.bytes <= limit * 5 / 4, "{} of {limit}", one.statistics.bytes);
     }
     assert!(bake(most, 2) == whole);

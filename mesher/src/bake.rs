@@ -32,7 +32,7 @@ pub struct BakeOptions {
     /// With more triangles than this a bake is not refined further; the last one with fewer is kept if there is one.
     pub max_triangles: usize,
     /// Bytes that a bake may hold, by the lengths of its tables. Where the next answers would take more, it is stopped with the best
-    /// bake so far; a mesh is counted once it is there.
+    /// bake so far; the first mesh is counted once it is there, finer ones are foreseen by their leaves.
     pub max_bytes: usize,
 }
 

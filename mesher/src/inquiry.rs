@@ -80,6 +80,14 @@ impl<'a> Inquiry<'a> {
         self.peak = self.peak.max(self.held + self.given);
     }
 
+    /// Whether so many bytes may be held beside the answers; if not, the bake is stopped.
+    pub fn has_room(&mut self, bytes: usize) -> bool {
+        if self.stopped.is_none() && bytes + self.given > self.most_bytes {
+            self.stopped = Some(Stop::Memory);
+        }
+        self.stopped.is_none()
+    }
+
     /// The most bytes that were held.
     pub fn peak(&self) -> usize {
         self.peak

@@ -121,7 +121,7 @@ impl Rounds<'_> {
                 break;
             }
             if self.reflected.divide(&mut self.solution, &divided)
-                && let Some(finer) = self.finer_mesh()
+                && let Some(finer) = self.finer_mesh(&fine)
             {
                 fine = finer;
             }
@@ -140,8 +140,14 @@ impl Rounds<'_> {
         fine
     }
 
-    /// The same; none if the bake was stopped before all of its light was known.
-    fn finer_mesh(&mut self) -> Option<FineMesh> {
+    /// The same after a division; none if the bake was stopped before all of its light was known, or the mesh would be too large: as
+    /// many times as the coarser one as there are leaves now.
+    fn finer_mesh(&mut self, coarser: &FineMesh) -> Option<FineMesh> {
+        let leaves = self.solution.elements.nodes.iter().filter(|node| node.child_count == 0).count();
+        let times = leaves as f64 / coarser.leaves.len().max(1) as f64;
+        if !self.inquiry.has_room((held(&self.solution, coarser) as f64 * times) as usize + self.lines.bytes()) {
+            return None;
+        }
         let fine = self.fine_mesh();
         (!self.inquiry.stopped()).then_some(fine)
     }
@@ -214,7 +220,7 @@ impl Rounds<'_> {
             for leaf in divided {
                 self.solution.subdivide(leaf);
             }
-            let Some(finer) = self.finer_mesh() else { break };
+            let Some(finer) = self.finer_mesh(&fine) else { break };
             fine = finer;
         }
         fine

@@ -13,6 +13,12 @@ use crate::ray_gather::SMALL_LEAF;
 use crate::solid::Solids;
 use crate::{Elements, Node, NodeId, Solution, Visibility};
 
+/// Cosine between normals from which on polygons lie along each other: what stands upright on an element has its foot on its border.
+const ALONG: f64 = 0.5;
+
+/// How far apart the feet on an element are, in what it reaches: two sides of one board have one foot.
+const APART: f64 = 0.25;
+
 /// A scene and the patches of its solutions, prepared for gathers.
 pub struct Surroundings<'a> {
     /// The scene.
@@ -92,12 +98,6 @@ impl<'a> Surroundings<'a> {
         chosen
     }
 }
-
-/// Cosine between normals from which on polygons lie along each other: what stands upright on an element has its foot on its border.
-const ALONG: f64 = 0.5;
-
-/// How far apart the feet on an element are, in what it reaches: two sides of one board have one foot.
-const APART: f64 = 0.25;
 
 impl PatchTree {
     pub fn new(elements: &Elements) -> Self {
