@@ -33,9 +33,9 @@ const MUCH: f64 = 0.5;
 /// chance, more leaves what costs next to nothing to mend.
 const CHEAP: f64 = 0.25;
 
-/// What light from emitters may use up of the share of reflected light, where rays find that: a sample of emitters costs a few
-/// rays, one of reflectors two hundred.
-const EMITTED_BY_RAYS: f64 = 0.7;
+/// What light from emitters may use up of the share of reflected light, where rays find that: where many faint emitters are told by
+/// rays, less divides leaves for what these scatter by, without end.
+const EMITTED_BY_RAYS: f64 = 1.8;
 
 /// Discontinuities that a leaf follows at most where links have not told them: a leaf that is wanting is divided besides. Ten
 /// double the triangles of a hall, and mend no more.
