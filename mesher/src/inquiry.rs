@@ -196,11 +196,7 @@ impl<'a> Inquiry<'a> {
     /// Begins a question whose answers are expected to take so many bytes; not where the bake has been stopped, or is by them. If it
     /// is another one than was remembered in its place, nothing that was remembered from there on is taken for an answer.
     fn ask<K: Hash>(&mut self, (kind, keys): (u8, impl ExactSizeIterator<Item = K>), bytes: usize) -> bool {
-        if self.stopped.is_some() {
-            return false;
-        }
-        if self.held + self.given + bytes > self.most_bytes {
-            self.stopped = Some(Stop::Memory);
+        if !self.has_room(self.held + bytes) {
             return false;
         }
         self.peak = self.peak.max(self.held + self.given + bytes);

@@ -177,7 +177,6 @@ mod tests {
         let bakes = Gather::with_source_error(&surroundings, &solution, 0.5);
         let [from, middle, to] = [0.0, 0.25, 0.5].map(|x| light(&bakes, x));
         assert!((from + to - 2.0 * middle).abs() < 1e-12 * middle);
-        let surroundings = Surroundings::new(&scene, &solution);
         let checks = Gather::with_turned_rays(&surroundings, &solution, 2.0, 1);
         let [from, between, to] = [0.0, 0.25, 0.5].map(|x| light(&checks, x));
         assert!((from + to - 2.0 * between).abs() > 1e-6 * between);

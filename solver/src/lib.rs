@@ -22,6 +22,7 @@ mod light_tree;
 mod linear_fit;
 mod openings;
 mod oracle;
+mod patch_tree;
 mod polygon_tree;
 mod principal_axes;
 mod quadrature;

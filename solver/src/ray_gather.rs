@@ -11,7 +11,8 @@ use scene::Ray;
 use crate::backprojection::Viewpoint;
 use crate::lattice::{hemisphere, shift};
 use crate::leaf_gather::SeenNode;
-use crate::surroundings::{PatchTree, Surroundings};
+use crate::patch_tree::PatchTree;
+use crate::surroundings::Surroundings;
 use crate::{NodeId, Patch, Solution};
 
 /// Rays from a point for a source error of `RAYS_ERROR`. What rays that are spread evenly miss falls with their number to the

@@ -195,14 +195,9 @@ mod tests {
         let solution = solve(&dark, &SolveOptions::default(), &|_| ());
         assert_eq!(solution.mean_irradiance, Rgb::ZERO);
         assert!(solution.convergence.reached);
-        assert_eq!(
-            Gather::new(&Surroundings::new(&dark, &solution), &solution).irradiance_at(
-                4,
-                DVec3::new(2.0, 2.0, 0.0),
-                DVec3::ZERO
-            ),
-            Rgb::ZERO
-        );
+        let surroundings = Surroundings::new(&dark, &solution);
+        let gather = Gather::new(&surroundings, &solution);
+        assert_eq!(gather.irradiance_at(4, DVec3::new(2.0, 2.0, 0.0), DVec3::ZERO), Rgb::ZERO);
     }
 
     /// Closed enclosure of uniform exitance M and reflectance ρ: B = M/(1−ρ) everywhere.

@@ -2,16 +2,17 @@
 //! them. Elements and light change while a scene is baked, these do not: one look at the scene serves all gathers.
 
 use glam::DVec3;
-use scene::{Bvh, Scene, centroid, luminance};
+use scene::{Scene, centroid, luminance};
 
 use crate::clip::{Position, locate};
 use crate::emitter::{Emitter, emitter_tree, emitters};
 use crate::geometry::Geometry;
 use crate::light_tree::LightTree;
+use crate::patch_tree::PatchTree;
 use crate::polygon_tree::PolygonTree;
 use crate::ray_gather::SMALL_LEAF;
 use crate::solid::Solids;
-use crate::{Elements, Node, NodeId, Solution, Visibility};
+use crate::{Node, NodeId, Solution, Visibility};
 
 /// Cosine between normals from which on polygons lie along each other: what stands upright on an element has its foot on its border.
 const ALONG: f64 = 0.5;
@@ -35,13 +36,6 @@ pub struct Surroundings<'a> {
     pub(crate) reflectances: Vec<f64>,
     /// Area below which an element is small, m².
     pub(crate) small: f64,
-}
-
-/// A hierarchy over patches, for rays.
-pub(crate) struct PatchTree {
-    pub bvh: Bvh,
-    /// By triangle of the hierarchy, the patch that it is a part of.
-    pub patches: Vec<u32>,
 }
 
 impl<'a> Surroundings<'a> {
@@ -81,7 +75,7 @@ impl<'a> Surroundings<'a> {
             }
             let foot = middle - plane.normal * height;
             let is_inside = locate(outline, plane.normal, foot, self.geometry.contact_tolerance) == Position::Interior;
-            let hides = (self.scene.area(other) / (height * height)).min(area / (height * height));
+            let hides = self.scene.area(other).min(area) / (height * height);
             is_inside.then_some((hides, foot))
         };
         let mut feet: Vec<(f64, DVec3)> = self.tree.around(outline, reach).into_iter().filter_map(foot).collect();
@@ -96,20 +90,6 @@ impl<'a> Surroundings<'a> {
             }
         }
         chosen
-    }
-}
-
-impl PatchTree {
-    pub fn new(elements: &Elements) -> Self {
-        let (mut triangles, mut patches) = (Vec::new(), Vec::new());
-        for (id, patch) in (0..).zip(&elements.patches) {
-            let outline = elements.outline(patch.root);
-            for edge in outline[1..].windows(2) {
-                triangles.push([outline[0], edge[0], edge[1]]);
-                patches.push(id);
-            }
-        }
-        Self { bvh: Bvh::of_triangles(triangles), patches }
     }
 }
 
