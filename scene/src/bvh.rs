@@ -1,33 +1,19 @@
 //! What a ray meets: a bounding volume hierarchy over triangles. The only file that names the BVH library.
 //!
-//! The library walks boxes in f32; boxes are padded so that it never skips a triangle that the exact f64
+//! Boxes are walked in f32 (`wide_tree`); they are padded so that no triangle is skipped that the exact f64
 //! intersection would hit, and hits are decided by [`ShearedRay::intersect`] alone.
 
 use std::time::Duration;
 
-use glam::{DVec3, Vec3A};
-use obvhs::{Boundable, BvhBuildParams, aabb::Aabb, cwbvh::CwBvh, cwbvh::builder::build_cwbvh, ray::RayHit};
+use glam::DVec3;
+use obvhs::{BvhBuildParams, aabb::Aabb, cwbvh::builder::build_cwbvh};
 
+use crate::wide_tree::WideTree;
 use crate::{Ray, Scene, ShearedRay};
 
 /// Padding of every box, as a fraction of the largest coordinate: several f32 roundings of a point and of a ray's
-/// direction. Larger only costs time. It bounds the depth of the hierarchy, too: between this and the whole there is no room
-/// for boxes that grow from level to level more often than the library has places for.
+/// direction. Larger only costs time.
 const PADDING: f64 = 4e-6;
-
-/// What the library counts as one, in lengths of a ray's direction. It skips boxes that end before a ten-thousandth of its one:
-/// so nothing is near enough for that.
-const LIBRARY_UNIT: f32 = 1.0 / (1u32 << 24) as f32;
-
-/// The nearest hit that the library is told of, in its units: behind a nearer one it would skip boxes that hold a nearer still.
-const NEAREST: f32 = 2e-4;
-
-/// The least component of a direction, as a fraction of the largest, by which boxes are sought: below, what a ray moves across
-/// all that f32 tells apart is less than a box's padding.
-const LEAST_COMPONENT: f64 = 1e-12;
-
-/// The largest inverse that leaves room for coordinates in f32.
-const LARGEST_INVERSE: f64 = 1e24;
 
 /// Cosine of the largest angle at which a surface's normal agrees with a stated one: 25°, wide enough for a normal
 /// that was rounded or interpolated, far from that of the next face of a box.
@@ -35,9 +21,11 @@ const AGREEMENT: f64 = 0.9;
 
 /// A hierarchy over triangles.
 pub struct Bvh {
-    bvh: CwBvh,
+    tree: WideTree,
     /// In the order of the hierarchy's leaves, so that those that are met together lie together.
     triangles: Vec<[DVec3; 3]>,
+    /// Where each was in the list that the hierarchy was made of.
+    indices: Vec<u32>,
     /// What the caller calls each triangle, in the same order.
     owners: Vec<u32>,
 }
@@ -55,16 +43,6 @@ pub struct Hit {
     pub t: f64,
     /// Geometric normal of the triangle, unit length, on the side it is counter-clockwise from.
     pub normal: DVec3,
-}
-
-struct Padded<'a>(&'a [DVec3; 3], f64);
-
-impl Boundable for Padded<'_> {
-    fn aabb(&self) -> Aabb {
-        let [a, b, c] = *self.0;
-        let pad = DVec3::splat(self.1);
-        Aabb::new((a.min(b).min(c) - pad).as_vec3a(), (a.max(b).max(c) + pad).as_vec3a())
-    }
 }
 
 impl Bvh {
@@ -89,12 +67,17 @@ impl Bvh {
 
     fn new(triangles: Vec<[DVec3; 3]>, owners: Vec<u32>) -> Self {
         let largest = triangles.iter().flatten().map(|p| p.abs().max_element()).fold(0.0, f64::max);
-        let padded: Vec<_> =
-            triangles.iter().map(|triangle| Padded(triangle, largest * PADDING + f64::MIN_POSITIVE)).collect();
-        let bvh = build_cwbvh(&padded, BvhBuildParams::medium_build(), &mut Duration::default());
+        let pad = DVec3::splat(largest * PADDING + f64::MIN_POSITIVE);
+        let padded: Vec<Aabb> = triangles
+            .iter()
+            .map(|&[a, b, c]| Aabb::new((a.min(b).min(c) - pad).as_vec3a(), (a.max(b).max(c) + pad).as_vec3a()))
+            .collect();
+        let bvh = build_cwbvh(&padded, BvhBuildParams::slow_build(), &mut Duration::default());
         let order = || bvh.primitive_indices.iter().map(|&index| index as usize);
+        let boxes: Vec<Aabb> = order().map(|i| padded[i]).collect();
+        let tree = WideTree::new(&bvh, &boxes);
         let (triangles, owners) = (order().map(|i| triangles[i]).collect(), order().map(|i| owners[i]).collect());
-        Self { bvh, triangles, owners }
+        Self { tree, triangles, indices: bvh.primitive_indices, owners }
     }
 
     /// The nearest triangle, from either side, farther away than `nearest` (in lengths of the direction).
@@ -112,18 +95,15 @@ impl Bvh {
     fn closest(&self, ray: &Ray, accept: impl Fn(u32, f64) -> bool) -> Option<Hit> {
         let mut best: Option<(f64, usize, f64, f64)> = None;
         let sheared = ShearedRay::new(ray);
-        self.bvh.ray_traverse(library_ray(ray, f32::INFINITY), &mut RayHit::none(), |_, slot| {
-            match sheared.intersect(&self.triangles[slot]) {
-                Some((distance, s, t)) if accept(self.owners[slot], distance) => {
-                    let first = |other: usize| self.bvh.primitive_indices[slot] < self.bvh.primitive_indices[other];
-                    if best.is_none_or(|(d, other, ..)| distance < d || (distance == d && first(other))) {
-                        best = Some((distance, slot, s, t));
-                    }
-                    // Rounded up, so that boxes at the same distance are still visited.
-                    ((distance as f32) / LIBRARY_UNIT * (1.0 + 4.0 * f32::EPSILON)).max(NEAREST)
-                }
-                _ => f32::INFINITY,
+        self.tree.along(ray, f64::INFINITY, |slot| {
+            let Some((distance, s, t)) = sheared.intersect(&self.triangles[slot]) else { return f64::INFINITY };
+            let first = |other: usize| self.indices[slot] < self.indices[other];
+            let is_nearer = best.is_none_or(|(d, other, ..)| distance < d || (distance == d && first(other)));
+            if !(is_nearer && accept(self.owners[slot], distance)) {
+                return f64::INFINITY;
             }
+            best = Some((distance, slot, s, t));
+            distance
         });
         best.map(|(distance, slot, s, t)| {
             let [a, b, c] = self.triangles[slot];
@@ -140,13 +120,13 @@ impl Bvh {
         let ray = Ray { origin: from, direction: to - from };
         let sheared = ShearedRay::new(&ray);
         let mut found = None;
-        self.bvh.ray_traverse_miss(library_ray(&ray, 1.0), |_, slot| {
+        self.tree.along(&ray, 1.0, |slot| {
             let owner = self.owners[slot];
             let hits = sheared.intersect(&self.triangles[slot]).is_some_and(|(distance, ..)| accept(owner, distance));
             if hits {
                 found = Some(owner);
             }
-            if hits { 0.0 } else { f32::INFINITY }
+            if hits { -1.0 } else { f64::INFINITY }
         });
         found
     }
@@ -171,34 +151,16 @@ impl Bvh {
     /// Calls `visit` with the id of every triangle whose padded box a segment touches, in no particular order.
     pub fn near_segment(&self, from: DVec3, to: DVec3, mut visit: impl FnMut(u32)) {
         let ray = Ray { origin: from, direction: to - from };
-        self.bvh.ray_traverse_anyhit(library_ray(&ray, 1.0), |_, slot| {
+        self.tree.along(&ray, 1.0, |slot| {
             visit(self.owners[slot]);
+            f64::INFINITY
         });
     }
 
     /// Calls `visit` with the id of every triangle below the boxes that `enters` takes, given by their lower and upper
     /// corners; in no particular order.
     pub fn within(&self, enters: impl Fn(DVec3, DVec3) -> bool, mut visit: impl FnMut(u32)) {
-        self.slots_within(enters, |slot| visit(self.owners[slot]));
-    }
-
-    fn slots_within(&self, enters: impl Fn(DVec3, DVec3) -> bool, mut visit: impl FnMut(usize)) {
-        let mut open: Vec<u32> = if self.triangles.is_empty() { Vec::new() } else { vec![0] };
-        while let Some(node) = open.pop() {
-            let node = &self.bvh.nodes[node as usize];
-            for child in (0..8).filter(|&child| !node.is_child_empty(child)) {
-                let bounds = node.child_aabb(child);
-                if !enters(bounds.min.as_dvec3(), bounds.max.as_dvec3()) {
-                    continue;
-                }
-                if node.is_leaf(child) {
-                    let (first, count) = node.child_primitives(child);
-                    (first..first + count).for_each(|slot| visit(slot as usize));
-                } else {
-                    open.push(node.child_node_index(child));
-                }
-            }
-        }
+        self.tree.within(enters, |slot| visit(self.owners[slot]));
     }
 
     /// The triangle nearest to a point, at most `reach` metres away, whose normal agrees with `normal`; the hit's
@@ -207,8 +169,8 @@ impl Bvh {
         let axis = normal.normalize_or_zero();
         let mut best: Option<(u32, Hit)> = None;
         let touches = |low: DVec3, high: DVec3| (point + reach).cmpge(low).all() && (point - reach).cmple(high).all();
-        self.slots_within(touches, |slot| {
-            let (index, [a, b, c]) = (self.bvh.primitive_indices[slot], self.triangles[slot]);
+        self.tree.within(touches, |slot| {
+            let (index, [a, b, c]) = (self.indices[slot], self.triangles[slot]);
             let normal = (b - a).cross(c - a).normalize_or_zero();
             if normal.dot(axis) < AGREEMENT {
                 return;
@@ -245,23 +207,6 @@ fn nearest_barycentrics([a, b, c]: [DVec3; 3], point: DVec3) -> (f64, f64) {
     let candidates = [(ab, 0.0), (1.0 - bc, bc), (0.0, 1.0 - ca)];
     let distance = |(s, t): (f64, f64)| (a + u * s + v * t).distance_squared(point);
     candidates.into_iter().min_by(|x, y| distance(*x).total_cmp(&distance(*y))).unwrap_or((0.0, 0.0))
-}
-
-/// A ray as the library walks boxes along it, as far as `farthest` lengths of the direction.
-fn library_ray(ray: &Ray, farthest: f32) -> obvhs::ray::Ray {
-    let least = (LEAST_COMPONENT * ray.direction.abs().max_element()).max(f64::MIN_POSITIVE);
-    let inverse = ray.direction.to_array().map(|component| {
-        let component = if component.abs() < least { least.copysign(component) } else { component };
-        (1.0 / component / f64::from(LIBRARY_UNIT)).clamp(-LARGEST_INVERSE, LARGEST_INVERSE) as f32
-    });
-    obvhs::ray::Ray {
-        origin: ray.origin.as_vec3a(),
-        // Only its signs are asked for, and they must be those of the inverse: −0 and what f32 rounds to it are neither.
-        direction: Vec3A::from_array(inverse.map(|component| 1f32.copysign(component))),
-        inv_direction: Vec3A::from_array(inverse),
-        tmin: 0.0,
-        tmax: farthest / LIBRARY_UNIT,
-    }
 }
 
 #[cfg(test)]

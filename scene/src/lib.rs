@@ -25,6 +25,7 @@ mod texture;
 mod texture_map;
 mod unfinished;
 mod weld;
+mod wide_tree;
 
 pub use baked::{
     Baked, BakedElement, BakedError, BakedTriangle, DiscontinuityLine, EdgeKind, LineKind, Provenance, SKY,

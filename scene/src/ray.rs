@@ -53,7 +53,7 @@ impl ShearedRay {
         let [x, y, z] = self.axes;
         let [shear_x, shear_y, scale] = self.shear;
         let sheared = |p: &DVec3| {
-            let p = p.to_array();
+            let p: &[f64; 3] = p.as_ref();
             let depth = p[z] - self.origin[z];
             (DVec2::new(p[x] - self.origin[x] - shear_x * depth, p[y] - self.origin[y] - shear_y * depth), depth)
         };

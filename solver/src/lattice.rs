@@ -74,9 +74,12 @@ pub fn spread(shift: DVec2, i: u32) -> DVec2 {
 /// Directions about a normal with a density of the cosine over π.
 pub fn hemisphere(normal: DVec3, count: u32, shift: DVec2) -> impl Iterator<Item = DVec3> {
     let (x, y) = normal.any_orthonormal_pair();
+    // It turns by the same angle from ray to ray, which costs less than to find each by its sine and cosine.
+    let [mut azimuth, turn] = [shift.y, STEP.y].map(|part| DVec2::from_angle(TAU * part));
     (0..count).map(move |i| {
-        let DVec2 { x: u, y: v } = spread(shift, i);
-        let (sin, cos) = (TAU * v).sin_cos();
+        let u = spread(shift, i).x;
+        let DVec2 { x: cos, y: sin } = azimuth;
+        azimuth = azimuth.rotate(turn);
         (x * cos + y * sin) * u.sqrt() + normal * (1.0 - u).sqrt()
     })
 }

@@ -158,7 +158,7 @@ fn scatter_of(rays: u32) -> f64 {
 
 /// Makes one of all that is seen of each node from `first` on.
 fn merge(seen: &mut Vec<SeenNode>, first: usize) {
-    seen[first..].sort_by_key(|seen| seen.node);
+    seen[first..].sort_unstable_by_key(|seen| seen.node);
     let mut end = first;
     for i in first..seen.len() {
         let next = seen[i];
