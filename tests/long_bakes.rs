@@ -4,7 +4,7 @@ use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use mesher::{Bake, BakeOptions, Control};
-use scene::{Answers, Scene};
+use scene::{Answers, Rows, Scene, Seen};
 use solver::{SolveOptions, Visibility, solve};
 
 use crate::fixture::{cornell_box, data, fails, folder, halflight, run, text};
@@ -91,11 +91,16 @@ fn forged_answers_are_not_taken() {
         assert!(bake(&scene, 0.02, forged, usize::MAX).1 == whole);
     };
     forge(&|_| ());
-    forge(&|forged| forged.rows[7][0].node = u32::MAX);
+    forge(&|forged| {
+        let strange = [Seen { node: u32::MAX, ..Seen::default() }];
+        let mut rows = Rows::default();
+        forged.rows.iter().enumerate().for_each(|(i, row)| rows.push(if i == 7 { &strange } else { row }));
+        forged.rows = rows;
+    });
     forge(&|forged| forged.questions[1] ^= 1);
     forge(&|forged| forged.questions.truncate(1));
     forge(&|forged| forged.emitted.truncate(5));
-    forge(&|forged| forged.rows.clear());
+    forge(&|forged| forged.rows.truncate(0));
 }
 
 /// What a limit of memory keeps is the same at any number of threads.

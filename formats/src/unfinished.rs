@@ -2,7 +2,7 @@
 //!
 //! They stand behind the bake's own, so that whoever only looks at the bake need not know of them.
 
-use scene::{Answers, Seen, Unfinished};
+use scene::{Answers, Rows, Unfinished};
 
 use crate::record::{from_bytes, to_bytes};
 
@@ -28,7 +28,7 @@ pub(crate) fn sections(unfinished: &Unfinished) -> [(&'static str, Vec<u8>); 8] 
         (EMITTED, to_bytes(&answers.emitted)),
         (SKY, to_bytes(&answers.sky)),
         (ROW_LENGTHS, to_bytes(&lengths)),
-        (ROWS, answers.rows.iter().flat_map(|row| to_bytes(row)).collect()),
+        (ROWS, to_bytes(answers.rows.seen())),
         (RESIDUALS, to_bytes(&answers.residuals)),
     ]
 }
@@ -38,15 +38,11 @@ pub(crate) fn unfinished<'a>(section: impl Fn(&str) -> Option<&'a [u8]>) -> Resu
     let bytes = |name: &'static str| section(name).ok_or(name);
     let text = |name| String::from_utf8(bytes(name)?.to_vec()).map_err(|_| name);
     let lengths: Vec<u32> = from_bytes(bytes(ROW_LENGTHS)?).ok_or(ROW_LENGTHS)?;
-    let seen: Vec<Seen> = from_bytes(bytes(ROWS)?).ok_or(ROWS)?;
-    let mut rest = seen.as_slice();
-    let rows: Option<Vec<Box<[Seen]>>> =
-        lengths.iter().map(|&length| rest.split_off(..length as usize).map(Into::into)).collect();
     let answers = Answers {
         questions: from_bytes(bytes(QUESTIONS)?).ok_or(QUESTIONS)?,
         emitted: from_bytes(bytes(EMITTED)?).ok_or(EMITTED)?,
         sky: from_bytes(bytes(SKY)?).ok_or(SKY)?,
-        rows: rows.filter(|_| rest.is_empty()).ok_or(ROW_LENGTHS)?,
+        rows: Rows::new(from_bytes(bytes(ROWS)?).ok_or(ROWS)?, &lengths).ok_or(ROW_LENGTHS)?,
         residuals: from_bytes(bytes(RESIDUALS)?).ok_or(RESIDUALS)?,
     };
     Ok(Unfinished { build: text(UNFINISHED)?, options: text(OPTIONS)?, answers })

@@ -67,7 +67,7 @@ pub(crate) fn mean_reflectance(scene: &Scene, solution: &Solution) -> f64 {
     let (mut arrives, mut leaves) = (0.0, 0.0);
     for leaf in solution.elements.leaves() {
         let Some(polygon) = solution.elements.polygon_of(leaf) else { continue };
-        let irradiance = solution.irradiance[leaf as usize].irradiance * solution.elements.nodes[leaf as usize].area;
+        let irradiance = solution.irradiance_over_links(leaf) * solution.elements.nodes[leaf as usize].area;
         arrives += colour_mean(irradiance);
         leaves += colour_mean(irradiance * scene.reflectance(polygon));
     }

@@ -88,7 +88,7 @@ impl CoarseMesh {
         /// Part of the way inwards by which a query on the border between two triangles is told to be on its own side.
         const INWARDS: f64 = 1e-6;
         let middle = scene::centroid(&self.leaves[leaf].outline);
-        let position = query.position + query.inward * (INWARDS * query.position.distance(middle));
+        let position = query.position + query.inward.as_dvec3() * (INWARDS * query.position.distance(middle));
         let place = |triangle: usize| {
             let [a, b, c] = self.corners(triangle);
             let normal = (b - a).cross(c - a);

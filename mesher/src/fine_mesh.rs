@@ -6,7 +6,7 @@
 use std::collections::HashMap;
 use std::sync::{Mutex, PoisonError};
 
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 use scene::{DiscontinuityLine, Rgb, SKY, Scene};
 use solver::{Cosine, Gather, NodeId, Shafts, Solution, Surroundings};
@@ -30,8 +30,8 @@ pub(crate) struct FineMesh {
     pub table: SampleTable,
     /// Irradiance from emitters at each sample of the table, W·m⁻², by polygons' own normals: what surfaces pass on.
     pub emitted: Vec<Rgb>,
-    /// The same by shading normals: what is looked at.
-    pub shown: Vec<Rgb>,
+    /// The same by shading normals: what is looked at. None where no polygon has such.
+    by_shading: Option<Vec<Rgb>>,
     /// The part of it that is the sky's; empty where there is none.
     pub shown_sky: Vec<Rgb>,
     /// The same at each triangle's probe point.
@@ -76,12 +76,19 @@ impl FineMesh {
             own
         };
         fine.emitted = known.at(solution, &fine.table.queries, inquiry);
-        fine.shown = shown(fine.emitted.clone(), known.at(solution, &shaded, inquiry));
+        if !shaded.is_empty() {
+            fine.by_shading = Some(shown(fine.emitted.clone(), known.at(solution, &shaded, inquiry)));
+        }
         if inquiry.has_sky() {
             fine.shown_sky = shown(known.sky_at(&fine.table.queries, inquiry), known.sky_at(&shaded, inquiry));
         }
         fine.probed = known.at(solution, &probes, inquiry);
         fine
+    }
+
+    /// Irradiance from emitters at each sample of the table that is looked at, W·m⁻².
+    pub fn shown(&self) -> &[Rgb] {
+        self.by_shading.as_ref().unwrap_or(&self.emitted)
     }
 
     /// Number of triangles.
@@ -101,7 +108,7 @@ impl FineMesh {
             .into_par_iter()
             .with_min_len(256)
             .map(|triangle| {
-                let samples = self.table.triangles[triangle].map(|sample| self.shown[sample as usize]);
+                let samples = self.table.triangles[triangle].map(|sample| self.shown()[sample as usize]);
                 let (s, t) = probe_point(self.probe_number(triangle));
                 let difference = scene::Interpolant::through(samples).evaluate(s, t) - self.probed[triangle];
                 (colour_mean(difference * difference).sqrt(), colour_mean(self.probed[triangle]))
@@ -121,7 +128,7 @@ impl FineMesh {
         let Leaf { polygon, element, .. } = self.leaves[self.mesh.triangles[triangle].leaf as usize];
         let (s, t) = probe_point(self.probe_number(triangle));
         let position = a * (1.0 - s - t) + b * s + c * t;
-        SampleQuery { position, polygon, element, inward: DVec3::ZERO, cosine: Cosine::Own }
+        SampleQuery { position, polygon, element, inward: Vec3::ZERO, cosine: Cosine::Own }
     }
 }
 
@@ -145,7 +152,8 @@ impl EmittedLight {
             let element = group[0].element;
             let mut own = locked().remove(&element).unwrap_or_default();
             let leaf = gather.over_emitters(element, &mut own);
-            let light = group.iter().map(|query| leaf.emitted(query.position, query.inward, query.cosine)).collect();
+            let light =
+                group.iter().map(|query| leaf.emitted(query.position, query.inward.as_dvec3(), query.cosine)).collect();
             locked().insert(element, own);
             light
         });

@@ -105,12 +105,12 @@ impl<'a> Inquiry<'a> {
 
     /// The light of emitters and of the sky by its number.
     pub fn light(&self, number: u32) -> Rgb {
-        self.answers.emitted[number as usize]
+        self.answers.emitted[number as usize].as_dvec3()
     }
 
     /// Its part from the sky.
     pub fn light_of_sky(&self, number: u32) -> Rgb {
-        self.answers.sky.get(number as usize).copied().unwrap_or_default()
+        self.answers.sky.get(number as usize).map_or(Rgb::ZERO, |light| light.as_dvec3())
     }
 
     /// Whether there is such a part.
@@ -120,7 +120,7 @@ impl<'a> Inquiry<'a> {
 
     /// A row by its number.
     pub fn row(&self, number: u32) -> &[Seen] {
-        &self.answers.rows[number as usize]
+        self.answers.rows.row(number as usize)
     }
 
     /// The light of emitters and of the sky at the first of the queries: all, unless the bake is stopped. `answer` finds it for
@@ -135,9 +135,9 @@ impl<'a> Inquiry<'a> {
             let known = queries.len().min(self.answers.emitted.len() - first);
             let found = self.find(Kind::Emitted, &by_element(&queries[known..]), answer);
             if self.has_sky {
-                self.answers.sky.extend(found.iter().map(|light| light.sky));
+                self.answers.sky.extend(found.iter().map(|light| light.sky.as_vec3()));
             }
-            self.answers.emitted.extend(found.iter().map(DirectIrradiance::total));
+            self.answers.emitted.extend(found.iter().map(|light| light.total().as_vec3()));
             self.emitted = self.answers.emitted.len().min(first + queries.len());
             self.given += (self.emitted - first) * bytes;
         }
@@ -157,15 +157,15 @@ impl<'a> Inquiry<'a> {
             let mut known = queries.len().min(self.answers.rows.len() - first);
             let is_strange = |row: &[Seen]| row.iter().any(|seen| seen.node as usize >= nodes);
             // Only a forged file has such.
-            if let Some(strange) = self.answers.rows[first..first + known].iter().position(|row| is_strange(row)) {
+            if let Some(strange) = (0..known).find(|row| is_strange(self.answers.rows.row(first + row))) {
                 known = strange;
                 self.rows = first + known;
                 self.forget();
             }
             let found = self.find(Kind::Rows, &by_element(&queries[known..]), answer);
-            self.answers.rows.extend(found);
+            found.iter().for_each(|row| self.answers.rows.push(row));
             self.rows = self.answers.rows.len().min(first + queries.len());
-            let bytes = self.answers.rows[first..self.rows].iter().map(|found| row(found.len())).sum::<usize>();
+            let bytes = (first..self.rows).map(|number| row(self.answers.rows.row(number).len())).sum::<usize>();
             self.given += bytes;
             self.row_bytes += bytes;
         }

@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use glam::{DVec2, DVec3};
+use glam::{DVec2, DVec3, Vec3};
 use rayon::prelude::*;
 use scene::Rgb;
 use solver::{Cosine, Fan, NodeId, Solution, Surroundings, Visibility};
@@ -118,7 +118,7 @@ pub(crate) fn leaf_probes(
     };
     let mut contacts: HashMap<NodeId, Vec<DVec3>> = HashMap::new();
     if solution.visibility == Visibility::Rays {
-        for query in table.queries.iter().filter(|query| query.inward != DVec3::ZERO) {
+        for query in table.queries.iter().filter(|query| query.inward != Vec3::ZERO) {
             contacts.entry(query.element).or_default().push(query.position);
         }
     }
@@ -158,7 +158,7 @@ pub(crate) fn probe(solution: &Solution, element: NodeId, i: u32) -> SampleQuery
         Visibility::Rays => Fan::new(outline).place(DVec2::ZERO, element.wrapping_add(i)),
     };
     let polygon = elements.polygon_of(element).unwrap_or_default();
-    SampleQuery { position, polygon, element, inward: DVec3::ZERO, cosine: Cosine::Own }
+    SampleQuery { position, polygon, element, inward: Vec3::ZERO, cosine: Cosine::Own }
 }
 
 #[cfg(test)]
@@ -213,12 +213,12 @@ mod tests {
         let (strip, large) = (solution.leaves_of(7)[0], solution.leaves_of(400)[0]);
         let leaves: Vec<NodeId> = scene.polygon_ids().flat_map(|polygon| solution.leaves_of(polygon)).collect();
         let contact =
-            SampleQuery { position: DVec3::new(7e-3, 0.0, 0.0), inward: DVec3::Y, ..probe(&solution, strip, 0) };
+            SampleQuery { position: DVec3::new(7e-3, 0.0, 0.0), inward: Vec3::Y, ..probe(&solution, strip, 0) };
         let table = SampleTable { queries: vec![contact], triangles: Vec::new() };
         let count = |table: &SampleTable| {
             let probes = leaf_probes(&Surroundings::new(&scene, &solution), &solution, &leaves, table);
             assert!(probes.len() <= 2 * leaves.len() + table.queries.len());
-            assert!(probes.iter().all(|probe| probe.inward == DVec3::ZERO));
+            assert!(probes.iter().all(|probe| probe.inward == Vec3::ZERO));
             [strip, large].map(|element| probes.iter().filter(|probe| probe.element == element).count())
         };
         let [alone, many] = count(&SampleTable::default());

@@ -12,11 +12,11 @@ const ENTRY: usize = size_of::<(QueryKey, u32)>() * 8 / 5;
 
 /// Bytes of an answer about emitters, of which a part may be the sky's.
 pub(crate) const fn emitted(has_sky: bool) -> usize {
-    ENTRY + size_of::<scene::Rgb>() * if has_sky { 2 } else { 1 }
+    ENTRY + size_of::<glam::Vec3>() * if has_sky { 2 } else { 1 }
 }
 
-/// Bytes of a row without what is seen in it, allocation included.
-const ROW: usize = ENTRY + size_of::<Box<[scene::Seen]>>() + 16;
+/// Bytes of a row without what is seen in it.
+const ROW: usize = ENTRY + size_of::<usize>();
 
 /// Bytes that a row is expected to take where none is known yet: a room shows some fifty elements to a point.
 pub(crate) const TYPICAL_ROW: usize = row(50);

@@ -20,8 +20,9 @@ type Part = ([DVec2; 3], [u32; 6]);
 
 struct LeafWeights {
     element: NodeId,
-    /// Sample, and its weight in the mean and in the gradients along u and v, m⁻¹.
-    weights: Vec<(u32, f64, DVec2)>,
+    /// Sample, and its weight in the mean and in the gradients along u and v, m⁻¹. There are a dozen for every sample, and f32 has the
+    /// digits that a plane's light needs.
+    weights: Vec<(u32, [f32; 3])>,
 }
 
 impl Projection {
@@ -42,7 +43,9 @@ impl Projection {
                 let corners = fine.corners(triangle).map(|corner: DVec3| patch.along(corner - centre));
                 (corners, fine.table.triangles[triangle])
             });
-            LeafWeights { element: leaf.element, weights: plane_weights(triangles) }
+            let short =
+                |(sample, mean, slope): (u32, f64, DVec2)| (sample, [mean, slope.x, slope.y].map(|part| part as f32));
+            LeafWeights { element: leaf.element, weights: plane_weights(triangles).into_iter().map(short).collect() }
         };
         Self { leaves: fine.leaves.par_iter().enumerate().map(leaf).collect() }
     }
@@ -51,11 +54,12 @@ impl Projection {
     pub fn planes(&self, samples: &[Rgb]) -> Vec<(NodeId, ElementLight)> {
         let plane = |leaf: &LeafWeights| {
             let mut light = ElementLight::default();
-            for &(sample, mean, gradient) in &leaf.weights {
+            for &(sample, weights) in &leaf.weights {
                 let value = samples[sample as usize];
+                let [mean, along_u, along_v] = weights.map(f64::from);
                 light.irradiance += value * mean;
-                light.gradient_u += value * gradient.x;
-                light.gradient_v += value * gradient.y;
+                light.gradient_u += value * along_u;
+                light.gradient_v += value * along_v;
             }
             // A plane that falls below zero within the leaf is no light: less steep, it keeps its mean.
             light.irradiance = light.irradiance.max(Rgb::ZERO);

@@ -78,6 +78,8 @@ impl ReflectedLight {
         if is_first {
             self.solve_roughly(surroundings, solution, fine, &projection, options, inquiry);
         }
+        // The last mesh is asked for light until the next one knows it, and never again where.
+        self.coarse.table.queries = Vec::new();
         let coarse = CoarseMesh::new(surroundings, solution, &self.front);
         let stand_ins =
             StandIns::new(scene, solution, &coarse.leaves, &coarse.mesh, (&coarse.table, &coarse.looked_at));
@@ -157,7 +159,7 @@ impl ReflectedLight {
 
     /// The irradiance from everywhere that is looked at, at the samples of a fine mesh, W·m⁻².
     pub fn irradiance(&self, solution: &Solution, fine: &FineMesh) -> Vec<Rgb> {
-        total(&self.coarse, Light::LookedAt, &fine.shown, &self.places(solution, fine))
+        total(&self.coarse, Light::LookedAt, fine.shown(), &self.places(solution, fine))
     }
 
     /// The errors of all leaves of the front, by what their probes see. None if the bake is stopped.
@@ -247,8 +249,8 @@ impl ReflectedLight {
             let mut seen = Vec::new();
             let row = |query: &&SampleQuery| {
                 seen.clear();
-                element.seen_nodes(query.position, query.inward, query.cosine, &mut seen);
-                seen.iter().map(in_few_digits).collect()
+                element.seen_nodes(query.position, query.inward.as_dvec3(), query.cosine, &mut seen);
+                seen.iter().map(|seen| in_few_digits(solution, seen)).collect()
             };
             group.iter().map(row).collect()
         });
@@ -315,9 +317,10 @@ const MOST_ITERATIONS: u32 = 5000;
 /// thousand times, and nobody sees it. Fewer wait for no more than that.
 const TRAPPED: usize = 500;
 
-/// A [`SeenNode`] in half of the memory.
-fn in_few_digits(seen: &SeenNode) -> Seen {
-    Seen { node: seen.node, form_factor: seen.form_factor as f32, offset: seen.offset.as_vec2().to_array() }
+/// A [`SeenNode`] in a third of the memory.
+fn in_few_digits(solution: &Solution, seen: &SeenNode) -> Seen {
+    let offset = (seen.offset / solution.elements.cell_length(seen.node) * f64::from(Seen::LENGTH)).round();
+    Seen { node: seen.node, form_factor: seen.form_factor as f32, offset: [offset.x as i16, offset.y as i16] }
 }
 
 /// Whether a row refers to nodes that have been divided since and whose light has turned out not to be linear, so that it
@@ -327,8 +330,8 @@ fn is_stale(gather: &Gather<'_>, row: &Row, allowed: f64) -> bool {
     row.iter().map(|seen| excess(seen).powi(2)).sum::<f64>() > allowed * allowed
 }
 
-/// What every node reflects: its radiosity as a plane, W·m⁻², in the digits that light needs, so that the light of a room
-/// stays in a processor's cache.
+/// What every node reflects: its radiosity as a plane, W·m⁻², and its change by the unit of a row's offsets; in the digits that
+/// light needs, so that the light of a room stays in a processor's cache.
 struct Radiosity(Vec<[Vec3; 3]>);
 
 impl Radiosity {
@@ -336,7 +339,9 @@ impl Radiosity {
         let node = |(node, light): (usize, &ElementLight)| {
             let polygon = solution.elements.polygon_of(node as u32);
             let reflectance = polygon.map_or(Rgb::ZERO, |polygon| scene.reflectance(polygon));
-            [light.irradiance, light.gradient_u, light.gradient_v].map(|part| (reflectance * part).as_vec3())
+            let unit = solution.elements.cell_length(node as u32) / f64::from(Seen::LENGTH);
+            [light.irradiance, light.gradient_u * unit, light.gradient_v * unit]
+                .map(|part| (reflectance * part).as_vec3())
         };
         Self(solution.light.par_iter().enumerate().with_min_len(256).map(node).collect())
     }
@@ -361,7 +366,8 @@ impl Radiosity {
         let part = |seen: &Seen| {
             let [middle, along_u, along_v] = self.0[seen.node as usize];
             // Light that is linear and nowhere negative is nowhere more than twice its mean.
-            let there = middle + along_u * seen.offset[0] + along_v * seen.offset[1];
+            let [u, v] = seen.offset.map(f32::from);
+            let there = middle + along_u * u + along_v * v;
             there.min(middle * 2.0).max(Vec3::ZERO) * seen.form_factor
         };
         rows.par_iter().with_min_len(64).map(|row| row.iter().map(part).sum::<Vec3>().as_dvec3()).collect()
@@ -396,7 +402,7 @@ mod tests {
     #[test]
     fn light_that_differs_by_direction_is_spread() {
         let radiosity = Radiosity([0.0, 3.0, 3.0].map(|light| [Vec3::splat(light), Vec3::ZERO, Vec3::ZERO]).to_vec());
-        let seen = |node: u32, form_factor: f32| Seen { node, form_factor, offset: [0.0; 2] };
+        let seen = |node: u32, form_factor: f32| Seen { node, form_factor, offset: [0; 2] };
         let spread = |row: &[Seen]| radiosity.spread(row);
         assert_eq!([spread(&[]), spread(&[seen(0, 1.0)]), spread(&[seen(1, 0.5), seen(2, 0.5)])], [0.0; 3]);
         assert_eq!(spread(&[seen(0, 0.5), seen(1, 0.25), seen(2, 0.25)]), 1.0);

@@ -109,7 +109,7 @@ impl Rounds<'_> {
             let leaves: Vec<(NodeId, f64)> = errors
                 .iter()
                 .map(|error| {
-                    let own = error.irradiance + colour_mean(self.solution.direct[error.element as usize].irradiance);
+                    let own = error.irradiance + colour_mean(self.solution.emitted_over_links(error.element));
                     (error.element, error.error / own.max(self.mean))
                 })
                 .collect();
@@ -155,11 +155,11 @@ impl Rounds<'_> {
     /// Irradiance at the samples of a mesh, W·m⁻².
     pub fn samples(&self, fine: &FineMesh) -> Vec<Rgb> {
         if !self.solution.reflects() {
-            return fine.shown.clone();
+            return fine.shown().to_vec();
         }
         if !self.reflected.is_known() {
             let guess = |query| guessed_reflected(&self.solution, query, self.reflectance);
-            return fine.table.queries.iter().zip(&fine.shown).map(|(query, light)| light + guess(query)).collect();
+            return fine.table.queries.iter().zip(fine.shown()).map(|(query, light)| light + guess(query)).collect();
         }
         self.reflected.irradiance(&self.solution, fine)
     }
@@ -189,7 +189,7 @@ impl Rounds<'_> {
         let mut fine = self.fine_mesh();
         if std::mem::take(&mut self.is_guessed) {
             let guess = self.mean;
-            self.take_means(&fine, &fine.shown);
+            self.take_means(&fine, fine.shown());
             // Nothing is known of reflected light yet but that there is as much as a closed room has.
             let bounces = if self.solution.reflects() { 1.0 / (1.0 - self.reflectance) } else { 1.0 };
             self.mean *= bounces;

@@ -8,7 +8,7 @@ use std::collections::HashMap;
 use std::hash::BuildHasher;
 
 use foldhash::{fast, quality};
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 use scene::Scene;
 use solver::{Contact, Cosine};
@@ -25,8 +25,9 @@ pub struct SampleQuery {
     /// An element (the solver's node) whose closure contains the position.
     pub element: u32,
     /// Where the value depends on the direction of approach, the unit direction in the polygon's plane that the limit is
-    /// taken from: across a line of contact, to the middle of the triangle that asks at a corner of contact. Zero elsewhere.
-    pub inward: DVec3,
+    /// taken from: across a line of contact, to the middle of the triangle that asks at a corner of contact. Zero elsewhere. It only
+    /// says on which side.
+    pub inward: Vec3,
     /// By which normal: the polygon's own, of light that it passes on, or the shading normal, of light that is looked at. Only on
     /// polygons with shading normals are these two questions.
     pub cosine: Cosine,
@@ -43,8 +44,8 @@ pub(crate) type ByQuery<T> = HashMap<QueryKey, T, fast::FixedState>;
 impl SampleQuery {
     pub(crate) fn key(&self) -> QueryKey {
         let [x, y, z] = self.position.to_array().map(f64::to_bits);
-        let [u, v, w] = self.inward.to_array().map(f64::to_bits);
-        let question = (self.polygon, [x, y, z, u, v, w], self.cosine);
+        let inward = self.inward.to_array().map(f32::to_bits);
+        let question = (self.polygon, [x, y, z], inward, self.cosine);
         [0, 1].map(|seed| quality::FixedState::with_seed(seed).hash_one(question))
     }
 
@@ -164,6 +165,7 @@ fn samples_on(
                 Some(Contact::Corner) => (Side::Of(id), inward),
             };
             *known.entry((station, side)).or_insert_with(|| {
+                let inward = inward.as_vec3();
                 table.queries.push(SampleQuery { position, polygon, element, inward, cosine: Cosine::Own });
                 table.queries.len() as u32 - 1
             })
@@ -244,7 +246,7 @@ mod tests {
         for (triangle, samples) in mesh.triangles.iter().zip(&table.triangles) {
             for query in samples.map(|sample| table.queries[sample as usize]) {
                 if query.position.y != 0.5 {
-                    assert_eq!(query.inward, DVec3::ZERO);
+                    assert_eq!(query.inward, Vec3::ZERO);
                 } else {
                     // The limit is taken from the triangle's own side, and asked of a leaf on that side.
                     assert_eq!(query.inward.y > 0.0, triangle.leaf == 1);

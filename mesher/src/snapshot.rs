@@ -50,7 +50,7 @@ pub fn flat_bake(scene: &Scene, solution: &Solution) -> Baked {
     for polygon in scene.polygon_ids() {
         for leaf in solution.leaves_of(polygon) {
             let irradiance = match solution.visibility {
-                Visibility::Links => solution.irradiance[leaf as usize].irradiance,
+                Visibility::Links => solution.irradiance_over_links(leaf),
                 Visibility::Rays => solution.mean_irradiance,
             };
             let irradiance = irradiance.max(Rgb::ZERO).as_vec3();

@@ -1,6 +1,6 @@
 //! Stand-ins: where light over reflectors is looked at in place of the samples of a mesh, and how much of each look a sample is.
 
-use glam::DVec3;
+use glam::Vec3;
 use rayon::prelude::*;
 use scene::{Rgb, Scene};
 use solver::{Cosine, PrincipalAxes, SMALL_LEAF, Solution, Visibility};
@@ -123,13 +123,13 @@ impl StandIns {
     /// straight line, is off in a strip.
     fn look_at(&mut self, solution: &Solution, query: &SampleQuery) -> Told {
         let number = self.queries.len() as u32;
-        if query.inward == DVec3::ZERO {
+        if query.inward == Vec3::ZERO {
             self.queries.push(*query);
             return Told::Look(number);
         }
         let centre = solution.elements.nodes[query.element as usize].centre;
         let aside =
-            |part: f64| SampleQuery { position: query.position.lerp(centre, part), inward: DVec3::ZERO, ..*query };
+            |part: f64| SampleQuery { position: query.position.lerp(centre, part), inward: Vec3::ZERO, ..*query };
         self.queries.extend([aside(ASIDE), aside(2.0 * ASIDE)]);
         Told::Aside(number)
     }
@@ -140,7 +140,7 @@ impl StandIns {
         let axes = PrincipalAxes::new(&leaf.outline, &solution.elements.patches[patch as usize])?;
         let first = self.queries.len() as u32;
         let Leaf { polygon, element, .. } = *leaf;
-        let query = |position| SampleQuery { position, polygon, element, inward: DVec3::ZERO, cosine: Cosine::Own };
+        let query = |position| SampleQuery { position, polygon, element, inward: Vec3::ZERO, cosine: Cosine::Own };
         self.queries.extend(axes.places().map(query));
         self.planes.push(LeafPlane { first, axes });
         Some(self.planes.len() as u32 - 1)
@@ -182,6 +182,7 @@ fn leaves_of_samples(mesh: &Mesh, table: &SampleTable) -> Vec<(u32, u32)> {
 mod tests {
     #![allow(clippy::unwrap_used)]
 
+    use glam::DVec3;
     use solver::{SolveOptions, solve};
 
     use super::*;
@@ -236,7 +237,7 @@ mod tests {
         let stand_ins =
             StandIns { told: vec![Told::Look(0), Told::Aside(0), Told::Between([0, 1])], ..StandIns::default() };
         let query =
-            SampleQuery { position: DVec3::ZERO, polygon: 0, element: 0, inward: DVec3::ZERO, cosine: Cosine::Own };
+            SampleQuery { position: DVec3::ZERO, polygon: 0, element: 0, inward: Vec3::ZERO, cosine: Cosine::Own };
         let table = SampleTable { queries: vec![query; 3], triangles: Vec::new() };
         let samples = stand_ins.of_samples(&table, &[Rgb::splat(3.0), Rgb::ONE]);
         assert_eq!(samples, [3.0, 5.0, 4.0].map(Rgb::splat));

@@ -1,4 +1,4 @@
-//! What a ray meets: a bounding volume hierarchy over triangles. The only file that names the BVH library.
+//! What a ray meets: a bounding volume hierarchy over triangles. With `wide_tree` the only file that names the BVH library.
 //!
 //! Boxes are walked in f32 (`wide_tree`); they are padded so that no triangle is skipped that the exact f64
 //! intersection would hit, and hits are decided by [`ShearedRay::intersect`] alone.
@@ -72,7 +72,7 @@ impl Bvh {
             .iter()
             .map(|&[a, b, c]| Aabb::new((a.min(b).min(c) - pad).as_vec3a(), (a.max(b).max(c) + pad).as_vec3a()))
             .collect();
-        let bvh = build_cwbvh(&padded, BvhBuildParams::slow_build(), &mut Duration::default());
+        let bvh = build_cwbvh(&padded, BvhBuildParams::medium_build(), &mut Duration::default());
         let order = || bvh.primitive_indices.iter().map(|&index| index as usize);
         let boxes: Vec<Aabb> = order().map(|i| padded[i]).collect();
         let tree = WideTree::new(&bvh, &boxes);

@@ -46,5 +46,5 @@ pub use rgb::{LUMINOUS_EFFICACY, Rgb, luminance};
 pub use scene::{LARGEST_COORDINATE, Scene, SceneError, other_sides};
 pub use texture::Texture;
 pub use texture_map::TextureMap;
-pub use unfinished::{Answers, Seen, Unfinished};
+pub use unfinished::{Answers, Rows, Seen, Unfinished};
 pub use weld::Welder;

@@ -4,7 +4,9 @@
 //! These answers are kept in the order in which they were asked for. So it does not matter when a bake is interrupted, and
 //! none of its other state has to be kept.
 
-use crate::{Rgb, SceneError};
+use glam::Vec3;
+
+use crate::SceneError;
 
 /// An interrupted bake's answers, and what they hold for.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -23,24 +25,90 @@ pub struct Answers {
     /// A checksum of every question, in order: answers are taken for as long as the questions are the same.
     pub questions: Vec<u64>,
     /// Irradiance straight from emitters and from the environment, W·m⁻².
-    pub emitted: Vec<Rgb>,
+    pub emitted: Vec<Vec3>,
     /// The part of each that is from the environment, W·m⁻²; empty where there is none.
-    pub sky: Vec<Rgb>,
+    pub sky: Vec<Vec3>,
     /// What samples see of the reflectors.
-    pub rows: Vec<Box<[Seen]>>,
+    pub rows: Rows,
     /// What was measured of the bake's residual: two differences of irradiance, and an irradiance, W·m⁻².
     pub residuals: Vec<[f64; 7]>,
 }
 
-/// A part of an element that a sample sees. f32 has the digits that light needs.
+/// A part of an element that a sample sees, in the digits that light needs: there are millions of them.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Seen {
     /// The element, a node of the solver's.
     pub node: u32,
     /// Form factor of what is seen of it.
     pub form_factor: f32,
-    /// From the middle of the element to the middle of what is seen of it, along its patch's u and v, metres.
-    pub offset: [f32; 2],
+    /// From the middle of the element to the middle of what is seen of it, along its patch's u and v; [`Seen::LENGTH`] is the
+    /// length of the element's cell.
+    pub offset: [i16; 2],
+}
+
+impl Seen {
+    /// The length of a cell in the unit of offsets.
+    pub const LENGTH: f32 = i16::MAX as f32;
+}
+
+/// Rows of what is seen, one after another in one list.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Rows {
+    seen: Vec<Seen>,
+    ends: Vec<usize>,
+}
+
+impl Rows {
+    /// Rows of the given lengths; none where these do not add up to what is seen.
+    pub fn new(seen: Vec<Seen>, lengths: &[u32]) -> Option<Self> {
+        let mut end = 0;
+        let ends: Vec<usize> = lengths
+            .iter()
+            .map(|&length| {
+                end += length as usize;
+                end
+            })
+            .collect();
+        (end == seen.len()).then_some(Self { seen, ends })
+    }
+
+    /// Number of rows.
+    pub fn len(&self) -> usize {
+        self.ends.len()
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.ends.is_empty()
+    }
+
+    /// A row by its number.
+    pub fn row(&self, number: usize) -> &[Seen] {
+        let first = if number == 0 { 0 } else { self.ends[number - 1] };
+        &self.seen[first..self.ends[number]]
+    }
+
+    /// All rows in their order.
+    pub fn iter(&self) -> impl Iterator<Item = &[Seen]> {
+        (0..self.len()).map(|number| self.row(number))
+    }
+
+    /// What is seen in all rows.
+    pub fn seen(&self) -> &[Seen] {
+        &self.seen
+    }
+
+    /// Adds a row.
+    pub fn push(&mut self, row: &[Seen]) {
+        self.seen.extend_from_slice(row);
+        self.ends.push(self.seen.len());
+    }
+
+    /// Keeps the first of the rows.
+    pub fn truncate(&mut self, count: usize) {
+        self.ends.truncate(count);
+        self.seen.truncate(self.ends.last().copied().unwrap_or_default());
+    }
 }
 
 impl Answers {
@@ -55,15 +123,42 @@ impl Answers {
             Some(i) => Err(SceneError::Number(format!("{what} {i}"))),
             None => Ok(()),
         };
-        let is_bad =
-            |seen: &Seen| ![seen.form_factor, seen.offset[0], seen.offset[1]].iter().all(|part| part.is_finite());
         number("answer about emitters", self.emitted.iter().position(|light| !light.is_finite()))?;
         number("answer about the sky", self.sky.iter().position(|light| !light.is_finite()))?;
         if !self.sky.is_empty() && self.sky.len() != self.emitted.len() {
             return Err(SceneError::Index(format!("answer about the sky {}", self.sky.len())));
         }
-        number("answer about reflectors", self.rows.iter().position(|row| row.iter().any(is_bad)))?;
+        number(
+            "answer about reflectors",
+            self.rows.iter().position(|row| !row.iter().all(|seen| seen.form_factor.is_finite())),
+        )?;
         let is_bad = |point: &[f64; 7]| !point.iter().all(|part| part.is_finite());
         number("answer about the residual", self.residuals.iter().position(is_bad))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+
+    use super::*;
+
+    #[test]
+    fn rows_come_back_as_they_were_added_and_are_cut_off_from_the_end() {
+        let seen = |node| Seen { node, form_factor: 0.5, offset: [3, -4] };
+        let all: [&[Seen]; 4] = [&[], &[seen(1), seen(2)], &[], &[seen(3)]];
+        let mut rows = Rows::default();
+        assert!(rows.is_empty() && rows.iter().next().is_none());
+        all.iter().for_each(|row| rows.push(row));
+        assert!(rows.iter().eq(all) && rows.len() == 4 && rows.row(3) == all[3]);
+        assert_eq!(Rows::new(rows.seen().to_vec(), &[0, 2, 0, 1]), Some(rows.clone()));
+        assert_eq!(Rows::new(rows.seen().to_vec(), &[0, 2]), None);
+        assert_eq!(Rows::new(rows.seen().to_vec(), &[u32::MAX, 2]), None);
+        rows.truncate(2);
+        assert!(rows.iter().eq(all[..2].iter().copied()) && rows.seen().len() == 2);
+        rows.truncate(9);
+        assert_eq!(rows.len(), 2);
+        rows.truncate(0);
+        assert_eq!(rows, Rows::default());
     }
 }

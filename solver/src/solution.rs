@@ -153,9 +153,9 @@ pub struct Solution {
     pub first_link: Vec<u32>,
     /// The links' blockers.
     pub blockers: BlockerLists,
-    /// Irradiance of each node, W·m⁻².
+    /// Irradiance of each node, W·m⁻²; empty where there are no links.
     pub irradiance: Vec<ElementLight>,
-    /// The part of it that comes straight from emitters.
+    /// The part of it that comes straight from emitters; as long.
     pub direct: Vec<ElementLight>,
     /// The irradiance that each node reflects: one bounce less than [`Solution::irradiance`].
     pub light: Vec<ElementLight>,
@@ -220,9 +220,10 @@ impl Solution {
         let parent = self.elements.nodes[leaf as usize];
         let Some(patch) = self.elements.patch_of(leaf) else { return };
         self.elements.subdivide(leaf);
-        for child in &self.elements.nodes[self.irradiance.len()..] {
+        for child in &self.elements.nodes[self.light.len()..] {
             let offset = self.elements.patches[patch as usize].along(child.centre - parent.centre);
-            for light in [&mut self.irradiance, &mut self.direct, &mut self.light] {
+            let known = [&mut self.irradiance, &mut self.direct, &mut self.light].into_iter();
+            for light in known.filter(|light| !light.is_empty()) {
                 let plane = light[leaf as usize];
                 light.push(ElementLight { irradiance: plane.at(offset), ..plane });
             }
@@ -241,11 +242,21 @@ impl Solution {
     /// The irradiance on a node that comes over reflectors, as far as the links know it, at an offset from the node's
     /// centre along its patch's u and v, metres; W·m⁻².
     pub fn reflected_over_links(&self, node: NodeId, offset: DVec2) -> Rgb {
-        if !self.reflects() {
+        if !self.reflects() || self.visibility == Visibility::Rays {
             return Rgb::ZERO;
         }
         let (all, direct) = (&self.irradiance[node as usize], &self.direct[node as usize]);
         (all.linear(offset) - direct.linear(offset)).max(Rgb::ZERO)
+    }
+
+    /// The mean irradiance on a node as far as the links know it, W·m⁻².
+    pub fn irradiance_over_links(&self, node: NodeId) -> Rgb {
+        self.irradiance.get(node as usize).map_or(Rgb::ZERO, |light| light.irradiance)
+    }
+
+    /// The mean irradiance straight from emitters on a node as far as the links know it, W·m⁻².
+    pub fn emitted_over_links(&self, node: NodeId) -> Rgb {
+        self.direct.get(node as usize).map_or(Rgb::ZERO, |light| light.irradiance)
     }
 
     /// Radiosity ρE + π·Ke of a surface node as a source, W·m⁻².

@@ -107,21 +107,20 @@ fn unlinked(
 ) -> Solution {
     let mut elements = Elements::new(pieces);
     elements.divide_larger((scene.surface_area() * LARGEST_SHARE).sqrt().min(scene.size() * LARGEST_CELL));
-    let dark = vec![ElementLight::default(); elements.nodes.len()];
     let tree = PolygonTree::new(scene);
     let sky = SkyCells::new(scene.environment.as_ref());
     let has_openings = !sky.is_dark() && scene.polygons.len() > MOST_WITH_SHAFTS;
     let openings = has_openings.then(|| Openings::new(scene, &tree, &elements, &sky));
     Solution {
         first_link: vec![0; elements.nodes.len() + 1],
+        light: vec![ElementLight::default(); elements.nodes.len()],
         elements,
         cuts,
         first_patch,
         links: Vec::new(),
         blockers: BlockerLists::default(),
-        irradiance: dark.clone(),
-        direct: dark.clone(),
-        light: dark,
+        irradiance: Vec::new(),
+        direct: Vec::new(),
         mean_irradiance: guessed_irradiance(scene, &tree),
         convergence: Convergence { reached: true, ..Convergence::default() },
         link_error: 0.0,

@@ -105,7 +105,7 @@ impl Solution {
             let Some(polygon) = self.elements.polygon_of(leaf) else { continue };
             let (material, area) = (scene.material(polygon), self.elements.nodes[leaf as usize].area);
             emitted += material.exitance() * area;
-            absorbed += (Rgb::ONE - scene.reflectance(polygon)) * self.irradiance[leaf as usize].irradiance * area;
+            absorbed += (Rgb::ONE - scene.reflectance(polygon)) * self.irradiance_over_links(leaf) * area;
         }
         (emitted - absorbed).abs().max_element() / emitted.max_element().max(f64::MIN_POSITIVE)
     }

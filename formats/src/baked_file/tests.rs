@@ -81,15 +81,15 @@ fn bake() -> Baked {
 
 /// What an interrupted bake has found out, with an answer of every kind.
 fn found_out() -> Unfinished {
-    let seen = |node| Seen { node, form_factor: 0.25, offset: [1.0, -2.0] };
+    let seen = |node| Seen { node, form_factor: 0.25, offset: [1, -2] };
     Unfinished {
         build: "halflight 0.1.0".into(),
         options: "tolerance 0.01".into(),
         answers: Answers {
             questions: vec![1, u64::MAX, 3],
-            emitted: vec![Rgb::new(1.0, 0.5, 1.0 / 3.0), Rgb::ZERO],
-            sky: vec![Rgb::new(0.5, 0.0, 0.25), Rgb::ZERO],
-            rows: vec![[seen(1), seen(7)].into(), [].into(), [seen(3)].into()],
+            emitted: vec![Vec3::new(1.0, 0.5, 1.0 / 3.0), Vec3::ZERO],
+            sky: vec![Vec3::new(0.5, 0.0, 0.25), Vec3::ZERO],
+            rows: Rows::new(vec![seen(1), seen(7), seen(3)], &[2, 0, 1]).unwrap(),
             residuals: vec![[0.1, 0.2, 0.3, -0.1, -0.2, -0.3, 7.0]],
         },
     }
@@ -152,7 +152,7 @@ fn an_interrupted_bake_comes_back_with_what_it_found_out_and_is_a_bake_to_all_ot
     bad.answers.residuals[0][6] = f64::NAN;
     assert!(matches!(read_interrupted(&interrupted(&bad)).unwrap_err(), FormatError::Invalid { .. }));
     bad = found_out();
-    bad.answers.rows[0][1].form_factor = f32::INFINITY;
+    bad.answers.rows.push(&[Seen { form_factor: f32::INFINITY, ..Seen::default() }]);
     assert!(matches!(read_interrupted(&interrupted(&bad)).unwrap_err(), FormatError::Invalid { .. }));
     bad = found_out();
     bad.answers.sky.pop();
