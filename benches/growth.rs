@@ -18,7 +18,7 @@ use serde_json::Value;
 /// Polygons asked for, where the command line names none.
 const SIZES: [u32; 4] = [1_000, 4_000, 16_000, 64_000];
 
-/// The error that is asked for: halls of 16,000 polygons and more are then off by 4 %, which nobody sees in a hall.
+/// The error that is asked for: halls are then off by 3 to 5 %, which nobody sees in a hall.
 const TOLERANCE: &str = "0.1";
 
 /// No second round is begun after so long: large halls would take several for the last of the error.

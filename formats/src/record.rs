@@ -30,7 +30,7 @@ macro_rules! numbers {
         }
     )*};
 }
-numbers!(u8, i16, u32, u64, f32, f64);
+numbers!(u8, i8, u16, u32, u64, f32, f64);
 
 impl<T: Record + Copy + Default, const N: usize> Record for [T; N] {
     const SIZE: usize = N * T::SIZE;
@@ -181,7 +181,7 @@ impl Record for DiscontinuityLine {
 }
 
 impl Record for Seen {
-    const SIZE: usize = 12;
+    const SIZE: usize = 8;
 
     fn put(&self, bytes: &mut Vec<u8>) {
         self.node.put(bytes);

@@ -3,7 +3,8 @@
 //! After each round (`rounds`) the whole is measured (`residual`, `claimed_error`). Where it misses the tolerance, the next
 //! round asks for less. Rounds are global: what is divided depends on the light alone, never on threads.
 
-use scene::{Answers, Baked, BakedError, Rgb, Scene};
+use glam::Vec3;
+use scene::{Answers, Baked, BakedError, Scene};
 use solver::{Solution, Surroundings, Visibility};
 
 use crate::claimed_error::{P99, mean_reflectance, measured};
@@ -181,7 +182,7 @@ pub fn resume(
     };
     let mut statistics = BakeStatistics { min_weight, ..BakeStatistics::default() };
     let mut without_gain = 0;
-    let mut best: Option<(FineMesh, Vec<Rgb>, BakedError)> = None;
+    let mut best: Option<(FineMesh, Vec<Vec3>, BakedError)> = None;
     let (fine, samples, error) = loop {
         let fine = rounds.mesh();
         let samples = rounds.samples(&fine);

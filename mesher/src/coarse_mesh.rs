@@ -1,22 +1,23 @@
 //! The coarse mesh: large leaves without discontinuities, at whose samples light over reflectors is found.
 
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 use scene::{Interpolant, Rgb};
 use solver::{Gather, NodeId, Solution, Surroundings};
 
+use crate::edge_table::MeshedLeaf;
 use crate::{Leaf, Mesh, SampleQuery, SampleTable, edge_table, leaf_meshes, sample_table};
 
 /// A mesh of the front, without discontinuities.
 #[derive(Default)]
 pub(crate) struct CoarseMesh {
-    pub leaves: Vec<Leaf>,
+    pub leaves: Vec<MeshedLeaf>,
     pub mesh: Mesh,
     /// After the samples' queries come those by shading normals, where there are such.
     pub table: SampleTable,
     /// First triangle of each leaf, and their number at the end.
     first: Vec<usize>,
     /// By query, irradiance over reflectors, W·m⁻².
-    pub values: Vec<Rgb>,
+    pub values: Vec<Vec3>,
     /// By sample, the query for what is looked at.
     pub looked_at: Vec<u32>,
 }
@@ -39,8 +40,8 @@ pub(crate) struct Place {
 }
 
 impl CoarseMesh {
-    /// Meshes elements of a solution, all dark.
-    pub fn new(surroundings: &Surroundings<'_>, solution: &Solution, front: &[NodeId]) -> Self {
+    /// Meshes elements of a solution, all dark; and what was meshed.
+    pub fn new(surroundings: &Surroundings<'_>, solution: &Solution, front: &[NodeId]) -> (Self, Vec<Leaf>) {
         let scene = surroundings.scene;
         let elements = &solution.elements;
         let leaf = |&element: &NodeId| Leaf {
@@ -66,8 +67,9 @@ impl CoarseMesh {
             looked_at[sample] = number;
         }
         table.queries.extend(shaded);
-        let values = vec![Rgb::ZERO; table.queries.len()];
-        Self { leaves, mesh, table, first, values, looked_at }
+        let values = vec![Vec3::ZERO; table.queries.len()];
+        let meshed = leaves.iter().map(MeshedLeaf::from).collect();
+        (Self { leaves: meshed, mesh, table, first, values, looked_at }, leaves)
     }
 
     fn corners(&self, triangle: usize) -> [DVec3; 3] {
@@ -80,14 +82,14 @@ impl CoarseMesh {
             Light::PassedOn => sample,
             Light::LookedAt => self.looked_at[sample as usize],
         });
-        Interpolant::through(samples.map(|query| self.values[query as usize])).evaluate(place.s, place.t)
+        Interpolant::through(samples.map(|query| self.values[query as usize].as_dvec3())).evaluate(place.s, place.t)
     }
 
     /// Where a query lies within a leaf: in the triangle that it is deepest in.
-    pub fn place(&self, leaf: usize, query: &SampleQuery) -> Option<Place> {
+    pub fn place(&self, solution: &Solution, leaf: usize, query: &SampleQuery) -> Option<Place> {
         /// Part of the way inwards by which a query on the border between two triangles is told to be on its own side.
         const INWARDS: f64 = 1e-6;
-        let middle = scene::centroid(&self.leaves[leaf].outline);
+        let middle = solution.elements.nodes[self.leaves[leaf].element as usize].centre;
         let position = query.position + query.inward.as_dvec3() * (INWARDS * query.position.distance(middle));
         let place = |triangle: usize| {
             let [a, b, c] = self.corners(triangle);

@@ -43,6 +43,21 @@ pub struct Leaf {
     pub segments: Vec<LeafSegment>,
 }
 
+/// What is asked of a leaf once it is meshed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct MeshedLeaf {
+    /// The solver's node.
+    pub element: u32,
+    /// The polygon that it is a part of.
+    pub polygon: u32,
+}
+
+impl From<&Leaf> for MeshedLeaf {
+    fn from(leaf: &Leaf) -> Self {
+        Self { element: leaf.element, polygon: leaf.polygon }
+    }
+}
+
 /// The part of a discontinuity inside one leaf.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LeafSegment {

@@ -8,9 +8,10 @@ use std::sync::{Mutex, PoisonError};
 
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
-use scene::{DiscontinuityLine, Rgb, SKY, Scene};
+use scene::{DiscontinuityLine, SKY, Scene};
 use solver::{Cosine, Gather, NodeId, Shafts, Solution, Surroundings};
 
+use crate::edge_table::MeshedLeaf;
 use crate::guess::guessed_emitted;
 use crate::inquiry::Inquiry;
 use crate::lines::Lines;
@@ -23,19 +24,19 @@ use crate::{
 /// A mesh of all leaves, and what emitters send to its samples.
 #[derive(Default)]
 pub(crate) struct FineMesh {
-    pub leaves: Vec<Leaf>,
+    pub leaves: Vec<MeshedLeaf>,
     /// The discontinuities that some leaf follows.
     pub lines: Vec<DiscontinuityLine>,
     pub mesh: Mesh,
     pub table: SampleTable,
     /// Irradiance from emitters at each sample of the table, W·m⁻², by polygons' own normals: what surfaces pass on.
-    pub emitted: Vec<Rgb>,
+    pub emitted: Vec<Vec3>,
     /// The same by shading normals: what is looked at. None where no polygon has such.
-    by_shading: Option<Vec<Rgb>>,
+    by_shading: Option<Vec<Vec3>>,
     /// The part of it that is the sky's; empty where there is none.
-    pub shown_sky: Vec<Rgb>,
+    pub shown_sky: Vec<Vec3>,
     /// The same at each triangle's probe point.
-    probed: Vec<Rgb>,
+    probed: Vec<Vec3>,
 }
 
 /// Which answer is the irradiance from emitters, at every point that was asked for so far: from mesh to mesh most stay.
@@ -62,6 +63,7 @@ impl FineMesh {
         let mesh = leaf_meshes(&edge_table(scene, &solution.cuts, &leaves));
         let gather = Gather::with_source_error(surroundings, solution, dim);
         let table = sample_table(scene, &leaves, &mesh, &|polygon, position| gather.contact(polygon, position));
+        let leaves = leaves.iter().map(MeshedLeaf::from).collect();
         let mut fine = Self { leaves, lines, mesh, table, ..Self::default() };
         let probes: Vec<SampleQuery> = (0..fine.triangles())
             .into_par_iter()
@@ -71,7 +73,7 @@ impl FineMesh {
         let (samples, shaded) = fine.table.shaded(scene);
         known.find(&gather, fine.table.queries.iter().chain(&shaded).chain(&probes), inquiry);
         known.shafts.retain(|&element, _| solution.elements.is_leaf(element));
-        let shown = |mut own: Vec<Rgb>, by_shading: Vec<Rgb>| {
+        let shown = |mut own: Vec<Vec3>, by_shading: Vec<Vec3>| {
             samples.iter().zip(by_shading).for_each(|(&sample, light)| own[sample] = light);
             own
         };
@@ -87,7 +89,7 @@ impl FineMesh {
     }
 
     /// Irradiance from emitters at each sample of the table that is looked at, W·m⁻².
-    pub fn shown(&self) -> &[Rgb] {
+    pub fn shown(&self) -> &[Vec3] {
         self.by_shading.as_ref().unwrap_or(&self.emitted)
     }
 
@@ -108,10 +110,11 @@ impl FineMesh {
             .into_par_iter()
             .with_min_len(256)
             .map(|triangle| {
-                let samples = self.table.triangles[triangle].map(|sample| self.shown()[sample as usize]);
+                let samples = self.table.triangles[triangle].map(|sample| self.shown()[sample as usize].as_dvec3());
                 let (s, t) = probe_point(self.probe_number(triangle));
-                let difference = scene::Interpolant::through(samples).evaluate(s, t) - self.probed[triangle];
-                (colour_mean(difference * difference).sqrt(), colour_mean(self.probed[triangle]))
+                let probed = self.probed[triangle].as_dvec3();
+                let difference = scene::Interpolant::through(samples).evaluate(s, t) - probed;
+                (colour_mean(difference * difference).sqrt(), colour_mean(probed))
             })
             .collect()
     }
@@ -125,7 +128,7 @@ impl FineMesh {
 
     fn probe_query(&self, triangle: usize) -> SampleQuery {
         let [a, b, c] = self.corners(triangle);
-        let Leaf { polygon, element, .. } = self.leaves[self.mesh.triangles[triangle].leaf as usize];
+        let MeshedLeaf { polygon, element } = self.leaves[self.mesh.triangles[triangle].leaf as usize];
         let (s, t) = probe_point(self.probe_number(triangle));
         let position = a * (1.0 - s - t) + b * s + c * t;
         SampleQuery { position, polygon, element, inward: Vec3::ZERO, cosine: Cosine::Own }
@@ -170,7 +173,7 @@ impl EmittedLight {
         seen
     }
 
-    fn at(&self, solution: &Solution, queries: &[SampleQuery], inquiry: &Inquiry<'_>) -> Vec<Rgb> {
+    fn at(&self, solution: &Solution, queries: &[SampleQuery], inquiry: &Inquiry<'_>) -> Vec<Vec3> {
         let known = |query: &SampleQuery| self.light.get(&query.key()).map(|&number| inquiry.light(number));
         if inquiry.stopped() {
             return guessed_emitted(solution, queries, &queries.iter().map(known).collect::<Vec<_>>());
@@ -179,7 +182,7 @@ impl EmittedLight {
     }
 
     /// The part that is the sky's, as far as it is known.
-    fn sky_at(&self, queries: &[SampleQuery], inquiry: &Inquiry<'_>) -> Vec<Rgb> {
+    fn sky_at(&self, queries: &[SampleQuery], inquiry: &Inquiry<'_>) -> Vec<Vec3> {
         let known = |query: &SampleQuery| self.light.get(&query.key()).map(|&number| inquiry.light_of_sky(number));
         queries.par_iter().map(|query| known(query).unwrap_or_default()).collect()
     }

@@ -5,6 +5,7 @@
 
 use std::collections::HashMap;
 
+use glam::Vec3;
 use scene::Rgb;
 use solver::{Solution, Visibility};
 
@@ -12,20 +13,20 @@ use crate::SampleQuery;
 use crate::reflected_light::offset;
 
 /// Irradiance from emitters, W·m⁻²: as it is known, or guessed.
-pub(crate) fn guessed_emitted(solution: &Solution, queries: &[SampleQuery], known: &[Option<Rgb>]) -> Vec<Rgb> {
+pub(crate) fn guessed_emitted(solution: &Solution, queries: &[SampleQuery], known: &[Option<Vec3>]) -> Vec<Vec3> {
     let pairs = || queries.iter().zip(known);
     if solution.visibility == Visibility::Links {
         let over_links = |query: &SampleQuery| {
-            solution.direct[query.element as usize].at(offset(solution, query.element, query.position))
+            solution.direct[query.element as usize].at(offset(solution, query.element, query.position)).as_vec3()
         };
         return pairs().map(|(query, known)| known.unwrap_or_else(|| over_links(query))).collect();
     }
-    let mean = |(sum, count): (Rgb, u32)| sum / f64::from(count.max(1));
+    let mean = |(sum, count): (Rgb, u32)| (sum / f64::from(count.max(1))).as_vec3();
     let mut of_all = (Rgb::ZERO, 0);
     let mut of_polygons: HashMap<u32, (Rgb, u32)> = HashMap::new();
     for (query, light) in pairs().filter_map(|(query, known)| Some((query, (*known)?))) {
         for (sum, count) in [&mut of_all, of_polygons.entry(query.polygon).or_default()] {
-            *sum += light;
+            *sum += light.as_dvec3();
             *count += 1;
         }
     }

@@ -7,14 +7,19 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 use std::ops::Range;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
+use glam::Vec3;
 use rayon::prelude::*;
-use scene::{Answers, Rgb, Seen};
+use scene::{Answers, Seen};
 use solver::{DirectIrradiance, Solution, Visibility};
 
 use crate::forecast::{Forecast, Kind};
 use crate::memory::{TYPICAL_ROW, emitted, row};
 use crate::residual::ResidualPoint;
 use crate::{Control, SampleQuery};
+
+/// Groups of questions whose answers threads hold before they are kept. More hold what is kept twice, fewer make threads wait for each
+/// other.
+const AT_A_TIME: usize = 8192;
 
 /// What is known, and what was asked so far of it.
 pub(crate) struct Inquiry<'a> {
@@ -104,13 +109,13 @@ impl<'a> Inquiry<'a> {
     }
 
     /// The light of emitters and of the sky by its number.
-    pub fn light(&self, number: u32) -> Rgb {
-        self.answers.emitted[number as usize].as_dvec3()
+    pub fn light(&self, number: u32) -> Vec3 {
+        self.answers.emitted[number as usize]
     }
 
     /// Its part from the sky.
-    pub fn light_of_sky(&self, number: u32) -> Rgb {
-        self.answers.sky.get(number as usize).map_or(Rgb::ZERO, |light| light.as_dvec3())
+    pub fn light_of_sky(&self, number: u32) -> Vec3 {
+        self.answers.sky.get(number as usize).copied().unwrap_or_default()
     }
 
     /// Whether there is such a part.
@@ -133,11 +138,13 @@ impl<'a> Inquiry<'a> {
         let (first, bytes) = (self.emitted, emitted(self.has_sky));
         if self.ask((0u8, queries.iter().map(|query| query.key())), queries.len() * bytes) {
             let known = queries.len().min(self.answers.emitted.len() - first);
-            let found = self.find(Kind::Emitted, &by_element(&queries[known..]), answer);
-            if self.has_sky {
-                self.answers.sky.extend(found.iter().map(|light| light.sky.as_vec3()));
-            }
-            self.answers.emitted.extend(found.iter().map(|light| light.total().as_vec3()));
+            let has_sky = self.has_sky;
+            self.find(Kind::Emitted, &by_element(&queries[known..]), answer, |answers, light| {
+                if has_sky {
+                    answers.sky.push(light.sky.as_vec3());
+                }
+                answers.emitted.push(light.total().as_vec3());
+            });
             self.emitted = self.answers.emitted.len().min(first + queries.len());
             self.given += (self.emitted - first) * bytes;
         }
@@ -162,8 +169,7 @@ impl<'a> Inquiry<'a> {
                 self.rows = first + known;
                 self.forget();
             }
-            let found = self.find(Kind::Rows, &by_element(&queries[known..]), answer);
-            found.iter().for_each(|row| self.answers.rows.push(row));
+            self.find(Kind::Rows, &by_element(&queries[known..]), answer, |answers, row| answers.rows.push(&row));
             self.rows = self.answers.rows.len().min(first + queries.len());
             let bytes = (first..self.rows).map(|number| row(self.answers.rows.row(number).len())).sum::<usize>();
             self.given += bytes;
@@ -183,10 +189,12 @@ impl<'a> Inquiry<'a> {
         if self.ask((2u8, points.iter().map(key)), 0) {
             let known = points.len().min(self.answers.residuals.len() - first);
             let unknown: Vec<usize> = (known..points.len()).collect();
-            let found = self.find(Kind::Residuals, &unknown.chunks(1).collect::<Vec<_>>(), |numbers| {
-                numbers.iter().map(|&number| measure(number, points[number]).numbers()).collect()
+            let answer = |numbers: &[usize]| {
+                numbers.iter().map(|&number| measure(number, points[number]).numbers()).collect::<Vec<_>>()
+            };
+            self.find(Kind::Residuals, &unknown.chunks(1).collect::<Vec<_>>(), answer, |answers, point| {
+                answers.residuals.push(point);
             });
-            self.answers.residuals.extend(found);
             self.residuals = self.answers.residuals.len().min(first + points.len());
         }
         let known = self.answers.residuals[first..self.residuals].iter().zip(points);
@@ -221,38 +229,40 @@ impl<'a> Inquiry<'a> {
         self.answers.residuals.truncate(self.residuals);
     }
 
-    /// The answers to the first of the questions, which are answered a group at a time: to all, unless the bake is stopped. Threads
-    /// take groups one after another, so that hardly an answer is lost when they stop.
+    /// Keeps the answers to the first of the questions, which are answered a group at a time: to all, unless the bake is stopped.
+    /// Threads take groups one after another, so that hardly an answer is lost when they stop.
     fn find<Q: Sync, A: Send>(
         &mut self,
         kind: Kind,
         groups: &[&[Q]],
         answer: impl Fn(&[Q]) -> Vec<A> + Sync,
-    ) -> Vec<A> {
+        keep: impl Fn(&mut Answers, A),
+    ) {
         let done = AtomicUsize::new(0);
         let all = groups.iter().map(|group| group.len()).sum::<usize>() as f64;
         let stretch = self.forecast.stretch(kind, all);
-        let mut found: Vec<(usize, Vec<A>)> = groups
-            .iter()
-            .enumerate()
-            .par_bridge()
-            .filter_map(|(number, group)| {
-                let answer = (!(self.control.interrupted)()).then(|| (number, answer(group)));
-                stretch.advance((done.fetch_add(group.len(), Ordering::Relaxed) + group.len()) as f64 / all);
-                answer
-            })
-            .collect();
+        for groups in groups.chunks(AT_A_TIME) {
+            let mut found: Vec<(usize, Vec<A>)> = groups
+                .iter()
+                .enumerate()
+                .par_bridge()
+                .filter_map(|(number, group)| {
+                    let answer = (!(self.control.interrupted)()).then(|| (number, answer(group)));
+                    stretch.advance((done.fetch_add(group.len(), Ordering::Relaxed) + group.len()) as f64 / all);
+                    answer
+                })
+                .collect();
+            found.sort_unstable_by_key(|answer| answer.0);
+            let is_whole = found.len() == groups.len();
+            let first = (0..).zip(found).take_while(|(place, (number, _))| place == number);
+            first.flat_map(|(_, (_, answers))| answers).for_each(|answer| keep(&mut self.answers, answer));
+            if !is_whole {
+                self.stopped = Some(Stop::Interrupted);
+                break;
+            }
+        }
         let seconds = stretch.seconds();
         self.forecast.end(kind, seconds, all);
-        found.sort_unstable_by_key(|answer| answer.0);
-        if found.len() < groups.len() {
-            self.stopped = Some(Stop::Interrupted);
-        }
-        (0..)
-            .zip(found)
-            .take_while(|(place, (number, _))| place == number)
-            .flat_map(|(_, (_, answers))| answers)
-            .collect()
     }
 }
 

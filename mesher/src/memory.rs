@@ -1,18 +1,19 @@
 //! What a bake holds in memory: counted from the lengths of its tables, so that the same bake is stopped by the same limit at the
 //! same place on every machine.
 
+use glam::Vec3;
 use solver::Solution;
 
 use crate::fine_mesh::FineMesh;
 use crate::samples::QueryKey;
-use crate::{Leaf, LeafSegment, MeshTriangle, SampleQuery};
+use crate::{MeshTriangle, SampleQuery};
 
 /// Bytes of an entry of a map from queries to answers, with the part of the table that is empty on average.
 const ENTRY: usize = size_of::<(QueryKey, u32)>() * 8 / 5;
 
 /// Bytes of an answer about emitters, of which a part may be the sky's.
 pub(crate) const fn emitted(has_sky: bool) -> usize {
-    ENTRY + size_of::<glam::Vec3>() * if has_sky { 2 } else { 1 }
+    ENTRY + size_of::<Vec3>() * if has_sky { 2 } else { 1 }
 }
 
 /// Bytes of a row without what is seen in it.
@@ -40,12 +41,9 @@ pub(crate) fn held(solution: &Solution, fine: &FineMesh) -> usize {
         + size_of_val(links.as_slice())
         + blockers.bytes()
         + [irradiance, direct, light].map(|light| size_of_val(light.as_slice())).iter().sum::<usize>();
-    let leaf = |leaf: &Leaf| {
-        size_of::<Leaf>() + size_of_val(leaf.outline.as_slice()) + leaf.segments.len() * size_of::<LeafSegment>()
-    };
-    let of_sample = size_of::<SampleQuery>() + 2 * size_of::<scene::Rgb>();
-    let of_triangle = size_of::<MeshTriangle>() + size_of::<[u32; 6]>() + size_of::<scene::Rgb>();
-    let mesh = fine.leaves.iter().map(leaf).sum::<usize>()
+    let of_sample = size_of::<SampleQuery>() + 2 * size_of::<Vec3>();
+    let of_triangle = size_of::<MeshTriangle>() + size_of::<[u32; 6]>() + size_of::<Vec3>();
+    let mesh = size_of_val(fine.leaves.as_slice())
         + size_of_val(fine.mesh.vertices.as_slice())
         + fine.table.queries.len() * of_sample
         + fine.triangles() * of_triangle;

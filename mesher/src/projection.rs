@@ -3,11 +3,12 @@
 //!
 //! A far point cannot tell the two apart; a near one sees no step within the leaf.
 
-use glam::{DVec2, DVec3};
+use glam::{DVec2, DVec3, Vec3};
 use rayon::prelude::*;
 use scene::Rgb;
 use solver::{ElementLight, NodeId, Solution};
 
+use crate::edge_table::MeshedLeaf;
 use crate::fine_mesh::FineMesh;
 
 /// The weights of samples in the planes of leaves.
@@ -35,7 +36,7 @@ impl Projection {
         for i in 1..first.len() {
             first[i] += first[i - 1];
         }
-        let leaf = |(i, leaf): (usize, &crate::Leaf)| {
+        let leaf = |(i, leaf): (usize, &MeshedLeaf)| {
             let elements = &solution.elements;
             let patch = elements.patches[elements.patch_of(leaf.element).unwrap_or_default() as usize];
             let centre = elements.nodes[leaf.element as usize].centre;
@@ -51,11 +52,11 @@ impl Projection {
     }
 
     /// The planes of all leaves for given values of the samples, W·m⁻².
-    pub fn planes(&self, samples: &[Rgb]) -> Vec<(NodeId, ElementLight)> {
+    pub fn planes(&self, samples: &[Vec3]) -> Vec<(NodeId, ElementLight)> {
         let plane = |leaf: &LeafWeights| {
             let mut light = ElementLight::default();
             for &(sample, weights) in &leaf.weights {
-                let value = samples[sample as usize];
+                let value = samples[sample as usize].as_dvec3();
                 let [mean, along_u, along_v] = weights.map(f64::from);
                 light.irradiance += value * mean;
                 light.gradient_u += value * along_u;

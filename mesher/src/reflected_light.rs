@@ -33,7 +33,7 @@ pub(crate) struct ReflectedLight {
     source_error: f64,
     coarse: CoarseMesh,
     /// What is reflected, at each sample of the fine mesh: the irradiance one bounce earlier.
-    pub reflecting: Vec<Rgb>,
+    pub reflecting: Vec<Vec3>,
 }
 
 /// What a sample sees of the reflectors.
@@ -80,9 +80,9 @@ impl ReflectedLight {
         }
         // The last mesh is asked for light until the next one knows it, and never again where.
         self.coarse.table.queries = Vec::new();
-        let coarse = CoarseMesh::new(surroundings, solution, &self.front);
-        let stand_ins =
-            StandIns::new(scene, solution, &coarse.leaves, &coarse.mesh, (&coarse.table, &coarse.looked_at));
+        let (coarse, leaves) = CoarseMesh::new(surroundings, solution, &self.front);
+        let stand_ins = StandIns::new(scene, solution, &leaves, &coarse.mesh, (&coarse.table, &coarse.looked_at));
+        drop(leaves);
         self.look(surroundings, solution, &stand_ins.queries, options, STALE, inquiry);
         if inquiry.stopped() {
             self.front = self.coarse.leaves.iter().map(|leaf| leaf.element).collect();
@@ -97,7 +97,7 @@ impl ReflectedLight {
         let samples = self.coarse.table.queries.len();
         // From darkness, so that what is dark stays exactly dark; later on from the light that is known, where all bounces count.
         let mut values =
-            if is_first || solution.bounces.is_some() { vec![Rgb::ZERO; samples] } else { receive(solution) };
+            if is_first || solution.bounces.is_some() { vec![Vec3::ZERO; samples] } else { receive(solution) };
         let passed_over = match solution.visibility {
             Visibility::Links => 0,
             Visibility::Rays => samples / TRAPPED,
@@ -132,11 +132,11 @@ impl ReflectedLight {
         let probes: Vec<SampleQuery> = self.front.iter().map(|&leaf| probe(solution, leaf, 0)).collect();
         let leaf_of = leaf_numbers(solution, &self.front);
         let mut correction = vec![Rgb::ZERO; self.front.len()];
-        let light = |solution: &Solution, correction: &[Rgb]| -> Vec<Rgb> {
-            let light = |(query, &emitted): (&SampleQuery, &Rgb)| {
+        let light = |solution: &Solution, correction: &[Rgb]| -> Vec<Vec3> {
+            let light = |(query, &emitted): (&SampleQuery, &Vec3)| {
                 let correction =
                     leaf_above(solution, &leaf_of, query.element).map_or(Rgb::ZERO, |leaf| correction[leaf]);
-                emitted + (over_links(solution, query.element, query.position) + correction).max(Rgb::ZERO)
+                emitted + (over_links(solution, query.element, query.position) + correction).max(Rgb::ZERO).as_vec3()
             };
             fine.table.queries.iter().zip(&fine.emitted).map(light).collect()
         };
@@ -150,7 +150,7 @@ impl ReflectedLight {
         for _ in 0..ROUGH_ITERATIONS {
             let values = Radiosity::of(surroundings.scene, solution).received(&rows);
             for ((correction, value), query) in correction.iter_mut().zip(values).zip(&probes) {
-                *correction = value - over_links(solution, query.element, query.position);
+                *correction = value.as_dvec3() - over_links(solution, query.element, query.position);
             }
             self.reflecting = light(solution, &correction);
             solution.set_light(projection.planes(&self.reflecting));
@@ -158,7 +158,7 @@ impl ReflectedLight {
     }
 
     /// The irradiance from everywhere that is looked at, at the samples of a fine mesh, W·m⁻².
-    pub fn irradiance(&self, solution: &Solution, fine: &FineMesh) -> Vec<Rgb> {
+    pub fn irradiance(&self, solution: &Solution, fine: &FineMesh) -> Vec<Vec3> {
         total(&self.coarse, Light::LookedAt, fine.shown(), &self.places(solution, fine))
     }
 
@@ -186,13 +186,15 @@ impl ReflectedLight {
             .into_iter()
             .zip(radiosity.received(&rows))
             .zip(spreads)
-            .map(|((query, exact), spread)| (query, exact, spread))
+            .map(|((query, exact), spread)| (query, exact.as_dvec3(), spread))
             .collect();
         let gather = Gather::with_source_error(surroundings, solution, options.source_error);
         let of_leaves: Vec<&[(SampleQuery, Rgb, f64)]> = looked.chunk_by(|a, b| a.0.element == b.0.element).collect();
         let probed = of_leaves.par_iter().enumerate().map(|(leaf, probes)| {
             let baked = |query: &SampleQuery| {
-                self.coarse.place(leaf, query).map_or(Rgb::ZERO, |place| self.coarse.at(place, Light::LookedAt))
+                self.coarse
+                    .place(solution, leaf, query)
+                    .map_or(Rgb::ZERO, |place| self.coarse.at(place, Light::LookedAt))
             };
             let both: Vec<[Rgb; 2]> = probes.iter().map(|(query, exact, _)| [baked(query), *exact]).collect();
             let element = probes[0].0.element;
@@ -270,7 +272,8 @@ impl ReflectedLight {
     /// Where the samples of a fine mesh lie on the coarse one; nowhere if that has no triangles there.
     fn places(&self, solution: &Solution, fine: &FineMesh) -> Vec<Option<Place>> {
         let leaf_of = leaf_numbers(solution, &self.front);
-        let place = |query: &SampleQuery| self.coarse.place(leaf_above(solution, &leaf_of, query.element)?, query);
+        let place =
+            |query: &SampleQuery| self.coarse.place(solution, leaf_above(solution, &leaf_of, query.element)?, query);
         fine.table.queries.par_iter().map(place).collect()
     }
 }
@@ -317,16 +320,15 @@ const MOST_ITERATIONS: u32 = 5000;
 /// thousand times, and nobody sees it. Fewer wait for no more than that.
 const TRAPPED: usize = 500;
 
-/// A [`SeenNode`] in a third of the memory.
+/// A [`SeenNode`] in a quarter of the memory.
 fn in_few_digits(solution: &Solution, seen: &SeenNode) -> Seen {
-    let offset = (seen.offset / solution.elements.cell_length(seen.node) * f64::from(Seen::LENGTH)).round();
-    Seen { node: seen.node, form_factor: seen.form_factor as f32, offset: [offset.x as i16, offset.y as i16] }
+    Seen::new(seen.node, seen.form_factor, seen.offset / solution.elements.cell_length(seen.node))
 }
 
 /// Whether a row refers to nodes that have been divided since and whose light has turned out not to be linear, so that it
 /// misplaces more than `allowed`, W·m⁻². What single nodes misplace is of either sign: squares add up.
 fn is_stale(gather: &Gather<'_>, row: &Row, allowed: f64) -> bool {
-    let excess = |seen: &Seen| (gather.misplaced(seen.node, f64::from(seen.form_factor)) - gather.budget()).max(0.0);
+    let excess = |seen: &Seen| (gather.misplaced(seen.node, f64::from(seen.form_factor())) - gather.budget()).max(0.0);
     row.iter().map(|seen| excess(seen).powi(2)).sum::<f64>() > allowed * allowed
 }
 
@@ -351,7 +353,7 @@ impl Radiosity {
         let [mut all, mut sum, mut square] = [0.0; 3];
         for seen in row {
             let radiosity = f64::from(self.0[seen.node as usize][0].element_sum());
-            let part = f64::from(seen.form_factor);
+            let part = f64::from(seen.form_factor());
             all += part;
             sum += part * radiosity;
             square += part * radiosity * radiosity;
@@ -362,30 +364,30 @@ impl Radiosity {
     }
 
     /// What rows receive, W·m⁻².
-    fn received(&self, rows: &[&Row]) -> Vec<Rgb> {
+    fn received(&self, rows: &[&Row]) -> Vec<Vec3> {
         let part = |seen: &Seen| {
             let [middle, along_u, along_v] = self.0[seen.node as usize];
             // Light that is linear and nowhere negative is nowhere more than twice its mean.
             let [u, v] = seen.offset.map(f32::from);
             let there = middle + along_u * u + along_v * v;
-            there.min(middle * 2.0).max(Vec3::ZERO) * seen.form_factor
+            there.min(middle * 2.0).max(Vec3::ZERO) * seen.form_factor()
         };
-        rows.par_iter().with_min_len(64).map(|row| row.iter().map(part).sum::<Vec3>().as_dvec3()).collect()
+        rows.par_iter().with_min_len(64).map(|row| row.iter().map(part).sum::<Vec3>()).collect()
     }
 }
 
-fn total(coarse: &CoarseMesh, light: Light, emitted: &[Rgb], places: &[Option<Place>]) -> Vec<Rgb> {
-    let reflected = |place: &Option<Place>| place.map_or(Rgb::ZERO, |place| coarse.at(place, light));
+fn total(coarse: &CoarseMesh, light: Light, emitted: &[Vec3], places: &[Option<Place>]) -> Vec<Vec3> {
+    let reflected = |place: &Option<Place>| place.map_or(Vec3::ZERO, |place| coarse.at(place, light).as_vec3());
     emitted.par_iter().zip(places).with_min_len(256).map(|(&emitted, place)| emitted + reflected(place)).collect()
 }
 
 /// The largest change but for as many that are larger.
-fn largest_move(from: &[Rgb], to: &[Rgb], passed_over: usize) -> f64 {
-    let mut moves: Vec<f64> = from.iter().zip(to).map(|(a, b)| (a - b).abs().max_element()).collect();
+fn largest_move(from: &[Vec3], to: &[Vec3], passed_over: usize) -> f64 {
+    let mut moves: Vec<f32> = from.iter().zip(to).map(|(a, b)| (a - b).abs().max_element()).collect();
     if moves.is_empty() {
         return 0.0;
     }
-    *moves.select_nth_unstable_by(passed_over, |a, b| b.total_cmp(a)).1
+    f64::from(*moves.select_nth_unstable_by(passed_over, |a, b| b.total_cmp(a)).1)
 }
 
 /// Where a position lies, from the middle of an element along its patch's u and v, metres.
@@ -402,7 +404,7 @@ mod tests {
     #[test]
     fn light_that_differs_by_direction_is_spread() {
         let radiosity = Radiosity([0.0, 3.0, 3.0].map(|light| [Vec3::splat(light), Vec3::ZERO, Vec3::ZERO]).to_vec());
-        let seen = |node: u32, form_factor: f32| Seen { node, form_factor, offset: [0; 2] };
+        let seen = |node: u32, form_factor: f64| Seen::new(node, form_factor, DVec2::ZERO);
         let spread = |row: &[Seen]| radiosity.spread(row);
         assert_eq!([spread(&[]), spread(&[seen(0, 1.0)]), spread(&[seen(1, 0.5), seen(2, 0.5)])], [0.0; 3]);
         assert_eq!(spread(&[seen(0, 0.5), seen(1, 0.25), seen(2, 0.25)]), 1.0);
@@ -413,7 +415,7 @@ mod tests {
     #[test]
     fn the_largest_moves_may_be_passed_over() {
         assert_eq!(largest_move(&[], &[], 0), 0.0);
-        let (from, to) = ([Rgb::ZERO; 4], [Rgb::X, Rgb::Y * -3.0, Rgb::Z * 2.0, Rgb::ZERO]);
+        let (from, to) = ([Vec3::ZERO; 4], [Vec3::X, Vec3::Y * -3.0, Vec3::Z * 2.0, Vec3::ZERO]);
         let moves: Vec<f64> = (0..4).map(|passed_over| largest_move(&from, &to, passed_over)).collect();
         assert_eq!(moves, [3.0, 2.0, 1.0, 0.0]);
     }

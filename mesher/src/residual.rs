@@ -8,7 +8,7 @@
 
 use std::collections::HashSet;
 
-use glam::{DVec2, DVec3};
+use glam::{DVec2, DVec3, Vec3};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use scene::{Bvh, Interpolant, Ray, Rgb, Scene, other_sides};
@@ -63,8 +63,8 @@ pub(crate) fn residual(
     surroundings: &Surroundings<'_>,
     solution: &Solution,
     fine: &FineMesh,
-    samples: &[Rgb],
-    reflecting: &[Rgb],
+    samples: &[Vec3],
+    reflecting: &[Vec3],
     tolerance: f64,
     inquiry: &mut Inquiry<'_>,
 ) -> Vec<ResidualPoint> {
@@ -79,8 +79,9 @@ pub(crate) fn residual(
     let bvh = Bvh::of_triangles((0..fine.triangles()).map(|triangle| fine.corners(triangle)).collect());
     let mean = colour_mean(solution.mean_irradiance);
     let misfits = misfits(scene, solution, fine, reflecting);
-    let value = |samples: &[Rgb], triangle: usize, s: f64, t: f64| {
-        Interpolant::through(fine.table.triangles[triangle].map(|sample| samples[sample as usize])).evaluate(s, t)
+    let value = |samples: &[Vec3], triangle: usize, s: f64, t: f64| {
+        Interpolant::through(fine.table.triangles[triangle].map(|sample| samples[sample as usize].as_dvec3()))
+            .evaluate(s, t)
     };
     let polygon_of = |triangle: u32| fine.leaves[fine.mesh.triangles[triangle as usize].leaf as usize].polygon;
     let other_sides = other_sides(scene);
@@ -144,7 +145,7 @@ fn residual_by_rays(
     surroundings: &Surroundings<'_>,
     solution: &Solution,
     fine: &FineMesh,
-    samples: &[Rgb],
+    samples: &[Vec3],
     tolerance: f64,
     inquiry: &mut Inquiry<'_>,
 ) -> Vec<ResidualPoint> {
@@ -160,7 +161,8 @@ fn residual_by_rays(
             emitted + half.irradiance_from(&seen)
         });
         let baked =
-            Interpolant::through(fine.table.triangles[triangle].map(|sample| samples[sample as usize])).evaluate(s, t);
+            Interpolant::through(fine.table.triangles[triangle].map(|sample| samples[sample as usize].as_dvec3()))
+                .evaluate(s, t);
         ResidualPoint {
             differences: halves.map(|half| baked - half),
             irradiance: colour_mean((halves[0] + halves[1]) / 2.0),
@@ -170,7 +172,7 @@ fn residual_by_rays(
 }
 
 /// By node, the mean square of what the radiosity of the bake differs by from the node's mean, averaged over the colours.
-fn misfits(scene: &Scene, solution: &Solution, fine: &FineMesh, reflecting: &[Rgb]) -> Vec<f64> {
+fn misfits(scene: &Scene, solution: &Solution, fine: &FineMesh, reflecting: &[Vec3]) -> Vec<f64> {
     let elements = &solution.elements;
     let mut sums = vec![0.0; elements.nodes.len()];
     if !solution.reflects() {
@@ -182,7 +184,8 @@ fn misfits(scene: &Scene, solution: &Solution, fine: &FineMesh, reflecting: &[Rg
         let part = scene::area_vector(&fine.corners(triangle)).length() / samples.len() as f64;
         for &sample in samples {
             for node in elements.ancestors(leaf.element).filter(|&node| elements.patch_of(node).is_some()) {
-                let difference = reflectance * (reflecting[sample as usize] - solution.light[node as usize].irradiance);
+                let difference =
+                    reflectance * (reflecting[sample as usize].as_dvec3() - solution.light[node as usize].irradiance);
                 sums[node as usize] += part * colour_mean(difference * difference);
             }
         }

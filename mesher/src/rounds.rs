@@ -153,23 +153,29 @@ impl Rounds<'_> {
     }
 
     /// Irradiance at the samples of a mesh, W·m⁻².
-    pub fn samples(&self, fine: &FineMesh) -> Vec<Rgb> {
+    pub fn samples(&self, fine: &FineMesh) -> Vec<Vec3> {
         if !self.solution.reflects() {
             return fine.shown().to_vec();
         }
         if !self.reflected.is_known() {
             let guess = |query| guessed_reflected(&self.solution, query, self.reflectance);
-            return fine.table.queries.iter().zip(fine.shown()).map(|(query, light)| light + guess(query)).collect();
+            return fine
+                .table
+                .queries
+                .iter()
+                .zip(fine.shown())
+                .map(|(query, light)| light + guess(query).as_vec3())
+                .collect();
         }
         self.reflected.irradiance(&self.solution, fine)
     }
 
     /// What a scene without links is told of its light as a whole by a mesh of it.
-    fn take_means(&mut self, fine: &FineMesh, samples: &[Rgb]) {
+    fn take_means(&mut self, fine: &FineMesh, samples: &[Vec3]) {
         let (mut arrives, mut reflected, mut area) = (Rgb::ZERO, Rgb::ZERO, 0.0);
         for (triangle, stations) in fine.table.triangles.iter().enumerate() {
             // A quadratic's mean is that of its midpoints.
-            let mean = [1, 3, 5].map(|i: usize| samples[stations[i] as usize]).iter().sum::<Rgb>() / 3.0;
+            let mean = [1, 3, 5].map(|i: usize| samples[stations[i] as usize].as_dvec3()).iter().sum::<Rgb>() / 3.0;
             let part = scene::area_vector(&fine.corners(triangle)).length();
             let polygon = fine.leaves[fine.mesh.triangles[triangle].leaf as usize].polygon;
             arrives += mean * part;

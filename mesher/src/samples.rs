@@ -33,9 +33,9 @@ pub struct SampleQuery {
     pub cosine: Cosine,
 }
 
-/// What the answer to a query depends on, its position and direction of approach to the bit, on its polygon, by a normal: as two
-/// checksums of 64 bits, of which no two queries of a bake have both in common. In full it would be three times as long.
-pub(crate) type QueryKey = [u64; 2];
+/// What the answer to a query depends on, its position and direction of approach to the bit, on its polygon, by a normal: as a checksum
+/// of 96 bits, which no two queries of a bake have in common. In full it would be four times as long.
+pub(crate) type QueryKey = [u32; 3];
 
 /// Something about queries. Their keys are spread evenly already, there are millions of them, and nobody attacks a bake: what the
 /// standard library's hash takes for that is a few percent of its time.
@@ -46,7 +46,8 @@ impl SampleQuery {
         let [x, y, z] = self.position.to_array().map(f64::to_bits);
         let inward = self.inward.to_array().map(f32::to_bits);
         let question = (self.polygon, [x, y, z], inward, self.cosine);
-        [0, 1].map(|seed| quality::FixedState::with_seed(seed).hash_one(question))
+        let [first, second] = [0, 1].map(|seed| quality::FixedState::with_seed(seed).hash_one(question));
+        [first as u32, (first >> 32) as u32, second as u32]
     }
 
     /// The same question about the light that is looked at.
@@ -77,6 +78,10 @@ impl SampleTable {
     }
 }
 
+/// Polygons whose samples are told apart at a time: more hold the samples of a large scene twice, fewer make threads wait for each
+/// other.
+const AT_A_TIME: usize = 4096;
+
 /// A vertex, given twice, or the midpoint between two vertices, the smaller first.
 type Station = [u32; 2];
 
@@ -105,24 +110,21 @@ pub fn sample_table(
     // Polygons have no samples in common.
     let of_polygons: Vec<&[MeshTriangle]> =
         mesh.triangles.chunk_by(|a, b| leaf_of(a).polygon == leaf_of(b).polygon).collect();
-    let tables: Vec<SampleTable> = of_polygons
-        .par_iter()
-        .map(|triangles| {
-            let polygon = leaf_of(&triangles[0]).polygon;
-            samples_on(polygon, leaves, (mesh, triangles), scene.plane(polygon).normal, |position| {
-                contact(polygon, position)
-            })
+    let of_polygon = |triangles: &&[MeshTriangle]| {
+        let polygon = leaf_of(&triangles[0]).polygon;
+        samples_on(polygon, leaves, (mesh, triangles), scene.plane(polygon).normal, |position| {
+            contact(polygon, position)
         })
-        .collect();
-    let mut all = SampleTable {
-        queries: Vec::with_capacity(tables.iter().map(|table| table.queries.len()).sum()),
-        triangles: Vec::with_capacity(mesh.triangles.len()),
     };
-    for table in tables {
-        let first = all.queries.len() as u32;
-        all.queries.extend(table.queries);
-        all.triangles.extend(table.triangles.into_iter().map(|samples| samples.map(|sample| first + sample)));
+    let mut all = SampleTable { queries: Vec::new(), triangles: Vec::with_capacity(mesh.triangles.len()) };
+    for some in of_polygons.chunks(AT_A_TIME) {
+        for table in some.par_iter().map(of_polygon).collect::<Vec<SampleTable>>() {
+            let first = all.queries.len() as u32;
+            all.queries.extend(table.queries);
+            all.triangles.extend(table.triangles.into_iter().map(|samples| samples.map(|sample| first + sample)));
+        }
     }
+    all.queries.shrink_to_fit();
     all
 }
 

@@ -2,30 +2,32 @@
 
 use glam::Vec3;
 use scene::{Baked, BakedElement, BakedError, BakedTriangle, Provenance, Rgb, Scene};
-use solver::{Solution, Visibility};
+use solver::{NodeId, Solution, Visibility};
 
+use crate::Mesh;
 use crate::bake::UNMEASURED;
+use crate::edge_table::MeshedLeaf;
 use crate::fine_mesh::FineMesh;
 use crate::rounds::Rounds;
-use crate::{Leaf, Mesh};
 
 impl Rounds<'_> {
     /// The bake of a mesh, with irradiance at its samples, W·m⁻², and its error.
-    pub fn baked(&self, fine: &FineMesh, samples: &[Rgb], error: BakedError) -> Baked {
-        let samples: Vec<Vec3> = samples.iter().map(|value| value.max(Rgb::ZERO).as_vec3()).collect();
+    pub fn baked(&self, fine: &FineMesh, samples: &[Vec3], error: BakedError) -> Baked {
+        let samples: Vec<Vec3> = samples.iter().map(|value| value.max(Vec3::ZERO)).collect();
         let (vertices, triangles) = stored_triangles(&fine.leaves, &fine.mesh, &fine.table.triangles);
         let solution = &self.solution;
-        let light = if solution.reflects() { &solution.light } else { &solution.irradiance };
-        let element = |leaf: &Leaf| BakedElement {
-            polygon: leaf.polygon,
-            irradiance: light[leaf.element as usize].irradiance.as_vec3(),
+        let light = |node: NodeId| match solution.reflects() {
+            true => solution.light[node as usize].irradiance,
+            false => solution.irradiance_over_links(node),
         };
+        let element =
+            |leaf: &MeshedLeaf| BakedElement { polygon: leaf.polygon, irradiance: light(leaf.element).as_vec3() };
         Baked {
             scene: self.surroundings.scene.clone(),
             vertices,
             triangle_errors: self.triangle_errors(fine, &samples),
             samples,
-            sky: fine.shown_sky.iter().map(|value| value.max(Rgb::ZERO).as_vec3()).collect(),
+            sky: fine.shown_sky.iter().map(|value| value.max(Vec3::ZERO)).collect(),
             triangles,
             elements: fine.leaves.iter().map(element).collect(),
             lines: fine.lines.clone(),
@@ -74,7 +76,7 @@ pub fn flat_bake(scene: &Scene, solution: &Solution) -> Baked {
 }
 
 /// The mesh as it is stored: without the vertices that no triangle uses.
-fn stored_triangles(leaves: &[Leaf], mesh: &Mesh, samples: &[[u32; 6]]) -> (Vec<Vec3>, Vec<BakedTriangle>) {
+fn stored_triangles(leaves: &[MeshedLeaf], mesh: &Mesh, samples: &[[u32; 6]]) -> (Vec<Vec3>, Vec<BakedTriangle>) {
     const UNUSED: u32 = u32::MAX;
     let mut stored = vec![UNUSED; mesh.vertices.len()];
     let mut vertices = Vec::new();

@@ -4,7 +4,7 @@
 //! These answers are kept in the order in which they were asked for. So it does not matter when a bake is interrupted, and
 //! none of its other state has to be kept.
 
-use glam::Vec3;
+use glam::{DVec2, Vec3};
 
 use crate::SceneError;
 
@@ -39,16 +39,33 @@ pub struct Answers {
 pub struct Seen {
     /// The element, a node of the solver's.
     pub node: u32,
-    /// Form factor of what is seen of it.
-    pub form_factor: f32,
+    /// Form factor of what is seen of it: five bits of an exponent, eleven of a fraction, for 2⁻³¹..2.
+    pub form_factor: u16,
     /// From the middle of the element to the middle of what is seen of it, along its patch's u and v; [`Seen::LENGTH`] is the
     /// length of the element's cell.
-    pub offset: [i16; 2],
+    pub offset: [i8; 2],
 }
 
 impl Seen {
     /// The length of a cell in the unit of offsets.
-    pub const LENGTH: f32 = i16::MAX as f32;
+    pub const LENGTH: f32 = i8::MAX as f32;
+
+    /// Places of a fraction that are left out, and the smallest number, of f32.
+    const FRACTION: u32 = 12;
+    const LEAST: u32 = (127 - 31) << 23;
+
+    /// What is seen of a node, with the offset in lengths of its cell.
+    pub fn new(node: u32, form_factor: f64, offset: DVec2) -> Self {
+        let nearest = (form_factor.max(0.0) as f32).to_bits() + (1 << (Self::FRACTION - 1));
+        let [u, v] = (offset * f64::from(Self::LENGTH)).round().to_array().map(|part| part as i8);
+        let form_factor = (nearest.saturating_sub(Self::LEAST) >> Self::FRACTION).min(u32::from(u16::MAX)) as u16;
+        Self { node, form_factor, offset: [u, v] }
+    }
+
+    /// Form factor of what is seen, 0..2.
+    pub fn form_factor(&self) -> f32 {
+        f32::from_bits((u32::from(self.form_factor) << Self::FRACTION) + Self::LEAST)
+    }
 }
 
 /// Rows of what is seen, one after another in one list.
@@ -128,10 +145,6 @@ impl Answers {
         if !self.sky.is_empty() && self.sky.len() != self.emitted.len() {
             return Err(SceneError::Index(format!("answer about the sky {}", self.sky.len())));
         }
-        number(
-            "answer about reflectors",
-            self.rows.iter().position(|row| !row.iter().all(|seen| seen.form_factor.is_finite())),
-        )?;
         let is_bad = |point: &[f64; 7]| !point.iter().all(|part| part.is_finite());
         number("answer about the residual", self.residuals.iter().position(is_bad))
     }
@@ -144,8 +157,22 @@ mod tests {
     use super::*;
 
     #[test]
+    fn what_is_seen_keeps_the_digits_that_light_needs() {
+        let seen = |form_factor| f64::from(Seen::new(7, form_factor, DVec2::ZERO).form_factor());
+        assert_eq!([0.0, 1e-12].map(seen).map(|least| least < 1e-9), [true; 2]);
+        for form_factor in [1e-9, 1.0 / 3.0, 0.999_9, 1.0, 1.000_001] {
+            assert!((seen(form_factor) / form_factor - 1.0).abs() < 1.3e-4, "{form_factor}");
+        }
+        assert_eq!(seen(1.0), 1.0);
+        assert!(seen(5.0) > 1.999 && seen(f64::NAN).is_finite());
+        let places = Seen::new(7, 0.1, DVec2::new(0.5, -0.3)).offset.map(|part| f32::from(part) / Seen::LENGTH);
+        assert!((places[0] - 0.5).abs() < 0.004 && (places[1] + 0.3).abs() < 0.004);
+        assert_eq!(Seen::new(7, 0.1, DVec2::new(9.0, f64::NAN)).offset, [i8::MAX, 0]);
+    }
+
+    #[test]
     fn rows_come_back_as_they_were_added_and_are_cut_off_from_the_end() {
-        let seen = |node| Seen { node, form_factor: 0.5, offset: [3, -4] };
+        let seen = |node| Seen::new(node, 0.5, DVec2::new(0.25, -0.5));
         let all: [&[Seen]; 4] = [&[], &[seen(1), seen(2)], &[], &[seen(3)]];
         let mut rows = Rows::default();
         assert!(rows.is_empty() && rows.iter().next().is_none());

@@ -2,10 +2,10 @@
 
 use std::path::PathBuf;
 
-use glam::{DVec3, Vec2};
+use glam::{DVec3, Vec2, Vec3};
 use proptest::prelude::*;
 use scene::{
-    Answers, BakedElement, BakedTriangle, Camera, DiscontinuityLine, EdgeKind, Gloss, LineKind, Polygon, Rgb, Seen,
+    Answers, BakedElement, BakedTriangle, Camera, DiscontinuityLine, EdgeKind, Gloss, LineKind, Polygon, Rgb, Rows, Seen,
     UpAxis,
 };
 
@@ -81,7 +81,7 @@ fn bake() -> Baked {
 
 /// What an interrupted bake has found out, with an answer of every kind.
 fn found_out() -> Unfinished {
-    let seen = |node| Seen { node, form_factor: 0.25, offset: [1, -2] };
+    let seen = |node| Seen { node, form_factor: 0x1234, offset: [1, -2] };
     Unfinished {
         build: "halflight 0.1.0".into(),
         options: "tolerance 0.01".into(),
@@ -150,9 +150,6 @@ fn an_interrupted_bake_comes_back_with_what_it_found_out_and_is_a_bake_to_all_ot
     assert_eq!(read_interrupted(&good).unwrap(), (bake(), None));
     let mut bad = found_out();
     bad.answers.residuals[0][6] = f64::NAN;
-    assert!(matches!(read_interrupted(&interrupted(&bad)).unwrap_err(), FormatError::Invalid { .. }));
-    bad = found_out();
-    bad.answers.rows.push(&[Seen { form_factor: f32::INFINITY, ..Seen::default() }]);
     assert!(matches!(read_interrupted(&interrupted(&bad)).unwrap_err(), FormatError::Invalid { .. }));
     bad = found_out();
     bad.answers.sky.pop();
