@@ -164,6 +164,11 @@ impl EmittedLight {
         self.light.extend(unknown.iter().map(|query| query.key()).zip(found));
     }
 
+    /// Forgets what stands between leaves and emitters: it can be found out again.
+    pub fn forget_shafts(&mut self) {
+        self.shafts = HashMap::new();
+    }
+
     /// Lends what stands between some leaves and the emitters, to look further.
     pub fn with_shafts<T>(&mut self, leaves: &[NodeId], look: impl FnOnce(&mut [(NodeId, Shafts)]) -> T) -> T {
         let mut lent: Vec<(NodeId, Shafts)> =

@@ -85,6 +85,7 @@ impl Rounds<'_> {
     /// bake is stopped meanwhile, the last mesh all of whose light from emitters is known, or the first.
     pub fn mesh(&mut self) -> FineMesh {
         let mut fine = self.mesh_emitted();
+        self.emitted.forget_shafts();
         if !self.solution.reflects() || self.inquiry.stopped() {
             return fine;
         }
