@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use glam::{DVec3, Vec2, Vec3};
 use proptest::prelude::*;
 use scene::{
-    Answers, BakedElement, BakedTriangle, Camera, DiscontinuityLine, EdgeKind, Gloss, LineKind, Polygon, Rgb, Rows, Seen,
-    UpAxis,
+    Answers, BakedElement, BakedTriangle, Camera, DiscontinuityLine, EdgeKind, Gloss, LineKind, Polygon, Rgb, Rows,
+    Seen, UpAxis,
 };
 
 use super::*;
