@@ -23,7 +23,7 @@ const ROW: usize = ENTRY + size_of::<usize>();
 pub(crate) const TYPICAL_ROW: usize = row(50);
 
 /// Meshes that are held at a time: the best so far, and one while it replaces another; and as much again on the way to one. With it
-/// the count is what two halls and the office were seen to take at most, to a third.
+/// the count of a bake of hundreds of megabytes is what rooms and halls were seen to take at most, to a fifth.
 const MESHES: usize = 6;
 
 /// Bytes of a row that names so many elements.
