@@ -1,4 +1,4 @@
-//! What a ray meets: a bounding volume hierarchy over triangles. With `wide_tree` the only file that names the BVH library.
+//! What a ray meets: a bounding volume hierarchy over triangles. This file and `wide_tree` alone name the BVH library.
 //!
 //! Boxes are walked in f32 (`wide_tree`); they are padded so that no triangle is skipped that the exact f64
 //! intersection would hit, and hits are decided by [`ShearedRay::intersect`] alone.

@@ -24,8 +24,8 @@ const LARGEST_CELL: f64 = 0.1;
 /// looked at: as a part of the area of all surfaces. Larger misses what lies between its probes.
 const LARGEST_SHARE: f64 = 1.0 / 1500.0;
 
-/// The same in mean areas of the scene's polygons: the larger a hall is, the more lamps a 1,500th of its ceiling hangs over. With a
-/// third of it a hall takes half as long again, without it, finds what is dark by and by, it takes a sixth longer, and is off by more.
+/// The same in mean areas of the scene's polygons: the larger a hall is, the more lamps hang under a 1,500th of its surfaces. One mean
+/// area divides for nothing, ten find the dark places over lamps too late: in a hall either takes longer.
 const LARGEST_IN_POLYGONS: f64 = 3.0;
 
 /// The part of its light that a room is taken to absorb at least, where its light is guessed.
