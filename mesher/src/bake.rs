@@ -167,6 +167,7 @@ pub fn resume(
     let mut rounds = Rounds {
         surroundings: &surroundings,
         options,
+        interrupted: control.interrupted,
         watch: control.watch,
         inquiry: Inquiry::new(control, &solution, answers, options.max_bytes),
         emitted: EmittedLight::default(),

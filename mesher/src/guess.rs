@@ -1,7 +1,8 @@
 //! Light where a bake was stopped before it was found: the best guess that is to be had.
 //!
 //! In a scene with links it is what these carry. Without, it is the mean of what is known on the same polygon, or if nothing is,
-//! of what is known anywhere; and light over reflectors is as much everywhere as a closed room of the scene's reflectance has.
+//! of what is known anywhere, or if that is nothing, of a closed room with the scene's lamps; and light over reflectors is as much
+//! everywhere as a closed room of the scene's reflectance has.
 
 use std::collections::HashMap;
 
@@ -30,6 +31,7 @@ pub(crate) fn guessed_emitted(solution: &Solution, queries: &[SampleQuery], know
             *count += 1;
         }
     }
+    let of_all = if of_all.1 == 0 { (solution.mean_irradiance, 1) } else { of_all };
     let guess = |query: &SampleQuery| mean(*of_polygons.get(&query.polygon).unwrap_or(&of_all));
     pairs().map(|(query, known)| known.unwrap_or_else(|| guess(query))).collect()
 }

@@ -60,14 +60,14 @@ impl Lines {
     }
 
     /// Looks for the lines of light from emitters in leaves, given ascending with their shafts, as far as that was not done
-    /// before. The least weight depends on a leaf's diameter, metres.
+    /// before. The least weight depends on the leaf, and on its diameter, metres.
     pub fn search(
         &mut self,
         scene: &Scene,
         (solution, gather): (&Solution, &Gather<'_>),
         leaves: &mut [(NodeId, Shafts)],
         weight: Weight,
-        min_weight: impl Fn(f64) -> f64 + Sync,
+        min_weight: impl Fn(NodeId, f64) -> f64 + Sync,
     ) {
         let elements = &solution.elements;
         let found: Vec<(Vec<Discontinuity>, Vec<u32>)> = leaves
@@ -82,7 +82,7 @@ impl Lines {
                 };
                 let mut interactions = gather.strong_emitters(*leaf, shafts);
                 interactions.retain(|interaction| !is_known(&interaction.source));
-                let (receiver, min_weight) = ((polygon, outline), min_weight(diameter(outline)));
+                let (receiver, min_weight) = ((polygon, outline), min_weight(*leaf, diameter(outline)));
                 let lines =
                     discontinuities_within(scene, &self.half_edges, receiver, &interactions, weight, min_weight);
                 (lines, interactions.iter().map(|interaction| interaction.source).collect())
@@ -144,7 +144,7 @@ mod tests {
             (&solution, &Gather::new(&Surroundings::new(&scene, &solution), &solution)),
             &mut [],
             Weight::Ratio,
-            |_| 0.0,
+            |_, _| 0.0,
         );
         assert!(lines.all().is_empty());
         assert!(scene.polygon_ids().all(|polygon| {
@@ -176,7 +176,7 @@ mod tests {
             let surroundings = Surroundings::new(&scene, &solution);
             let gather = Gather::with_source_error(&surroundings, &solution, 1e-3);
             let mut asked = [(leaf, Shafts::default())];
-            lines.search(&scene, (&solution, &gather), &mut asked, Weight::Ratio, |_| 0.0);
+            lines.search(&scene, (&solution, &gather), &mut asked, Weight::Ratio, |_, _| 0.0);
             let outline = solution.elements.outline(leaf);
             let found = ranked(outline, lines.all(), lines.on(&solution, 0, leaf).collect());
             let expected = ranked(outline, &whole, (0..whole.len() as u32).collect());
@@ -199,7 +199,7 @@ mod tests {
         let gather = Gather::with_source_error(&surroundings, &solution, 1e-3);
         let mut parts: Vec<(NodeId, Shafts)> =
             solution.elements.children(leaf).map(|part| (part, Shafts::default())).collect();
-        lines.search(&scene, (&solution, &gather), &mut parts, Weight::Ratio, |_| 0.0);
+        lines.search(&scene, (&solution, &gather), &mut parts, Weight::Ratio, |_, _| 0.0);
         assert_eq!(lines.all().len(), known);
         assert!(parts.iter().all(|(part, _)| lines.on(&solution, 0, *part).eq(lines.on(&solution, 0, leaf))));
     }
@@ -218,7 +218,7 @@ mod tests {
         let mut lines = Lines::of_links(&scene, &solution, Weight::Change, None);
         let mut leaves: Vec<(NodeId, Shafts)> =
             solution.leaves_of(0).into_iter().map(|leaf| (leaf, Shafts::default())).collect();
-        lines.search(&scene, (&solution, &gather), &mut leaves, Weight::Change, |_| 0.0);
+        lines.search(&scene, (&solution, &gather), &mut leaves, Weight::Change, |_, _| 0.0);
         // How far outside of the plate's picture on the floor a place is.
         let outside = |place: DVec3| ((place.x - 0.3).abs().max((place.y - 0.2).abs())) - 0.4;
         let penumbra = 1.01 * scene::SUN_RADIUS;

@@ -3,7 +3,7 @@
 
 use glam::{DVec2, Vec3};
 use scene::{Baked, Rgb};
-use solver::{Gather, NodeId, Solution, Surroundings, Visibility};
+use solver::{Gather, NodeId, Solution, Surroundings, Visibility, first_look};
 
 use crate::BakeOptions;
 use crate::claimed_error::LARGEST_REFLECTANCE;
@@ -33,9 +33,9 @@ const MUCH: f64 = 0.5;
 /// chance, more leaves what costs next to nothing to mend.
 const CHEAP: f64 = 0.25;
 
-/// What light from emitters may use up of the share of reflected light, where rays find that: where many faint emitters are told by
-/// rays, less divides leaves for what these scatter by, without end.
-const EMITTED_BY_RAYS: f64 = 1.8;
+/// What light from emitters may use up of the share of reflected light, where rays find that. In a row of rooms it is had for a quarter of
+/// the time; in a hall, where many faint emitters are told by rays, less divides leaves for what these scatter by, without end.
+const EMITTED_BY_RAYS: f64 = 1.5;
 
 /// Discontinuities that a leaf follows at most where links have not told them: a leaf that is wanting is divided besides. Ten
 /// double the triangles of a hall, and mend no more.
@@ -49,11 +49,11 @@ const SMALLEST_LEAF: f64 = 1e-3;
 /// the last one's change, summed over the bounces to come.
 const RESIDUAL_SHARE: f64 = 0.02;
 
+/// The same in a scene without links, whose dim rooms count by their own light.
+const RESIDUAL_SHARE_BY_RAYS: f64 = 0.002;
+
 /// An emitter that sends less than this part of the tolerance to a point is dim there.
 const DIM: f64 = 0.5;
-
-/// The part of its guess that a scene's mean irradiance may turn out to be without light being found anew. Less scatters more.
-const BELOW_GUESS: f64 = 0.5;
 
 /// What goes from round to round.
 pub(crate) struct Rounds<'a> {
@@ -62,13 +62,15 @@ pub(crate) struct Rounds<'a> {
     pub solution: Solution,
     pub lines: Lines,
     pub inquiry: Inquiry<'a>,
+    /// Whether to stop at once.
+    pub interrupted: &'a (dyn Fn() -> bool + Sync),
     /// Who is shown every mesh, and all that is found out of its light.
     pub watch: Option<&'a (dyn Fn(Baked) + Sync)>,
     pub emitted: EmittedLight,
     pub reflected: ReflectedLight,
     /// Mean irradiance of all surfaces, averaged over the colours, W·m⁻².
     pub mean: f64,
-    /// Whether that is but a guess.
+    /// Whether that is but a guess, since nobody has looked.
     pub is_guessed: bool,
     /// The share of the tolerance that reflected light may use up in this round, and the other kind as much, but where rays find it.
     pub share: f64,
@@ -89,10 +91,14 @@ impl Rounds<'_> {
         if !self.solution.reflects() || self.inquiry.stopped() {
             return fine;
         }
+        let share = match self.solution.visibility {
+            Visibility::Links => RESIDUAL_SHARE,
+            Visibility::Rays => RESIDUAL_SHARE_BY_RAYS,
+        };
         for mesh in 1..=MESHES {
             let exchange = Exchange {
                 source_error: self.source_share * self.options.tolerance,
-                residual: RESIDUAL_SHARE * self.options.tolerance * self.mean * (1.0 - self.reflectance),
+                residual: share * self.options.tolerance * self.mean * (1.0 - self.reflectance),
             };
             self.reflected.solve(self.surroundings, &mut self.solution, &fine, &exchange, &mut self.inquiry);
             if self.inquiry.stopped() {
@@ -111,7 +117,7 @@ impl Rounds<'_> {
                 .iter()
                 .map(|error| {
                     let own = error.irradiance + colour_mean(self.solution.emitted_over_links(error.element));
-                    (error.element, error.error / own.max(self.mean))
+                    (error.element, error.error / own.max(self.mean_around(error.element)))
                 })
                 .collect();
             let is_late = self.solution.visibility == Visibility::Rays && mesh >= MESHES_BY_RAYS;
@@ -193,20 +199,15 @@ impl Rounds<'_> {
 
     /// Divides leaves until light from emitters is interpolated well enough.
     fn mesh_emitted(&mut self) -> FineMesh {
-        let mut fine = self.fine_mesh();
-        if std::mem::take(&mut self.is_guessed) {
-            let guess = self.mean;
-            self.take_means(&fine, fine.shown());
-            // Nothing is known of reflected light yet but that there is as much as a closed room has.
-            let bounces = if self.solution.reflects() { 1.0 / (1.0 - self.reflectance) } else { 1.0 };
-            self.mean *= bounces;
-            self.solution.mean_irradiance *= bounces;
-            // What was faint beside the guess may not be so beside this.
-            if self.mean < BELOW_GUESS * guess {
-                self.emitted = EmittedLight::default();
-                fine = self.fine_mesh();
-            }
+        if std::mem::take(&mut self.is_guessed)
+            && let Some(look) = first_look(self.surroundings, &self.solution, self.interrupted)
+        {
+            self.solution.mean_irradiance = look.mean_irradiance;
+            self.solution.outlooks = look.outlooks;
+            self.mean = colour_mean(look.mean_irradiance);
+            self.reflectance = look.reflectance.min(LARGEST_REFLECTANCE);
         }
+        let mut fine = self.fine_mesh();
         for mesh in 1..=MESHES {
             let mut leaves: Vec<(NodeId, f64)> = fine.leaves.iter().map(|leaf| (leaf.element, 0.0)).collect();
             for (triangle, (error, emitted)) in fine.probe_emitted().into_iter().enumerate() {
@@ -215,7 +216,7 @@ impl Rounds<'_> {
                 let own = emitted + colour_mean(self.solution.reflected_over_links(element, DVec2::ZERO));
                 let part = scene::area_vector(&fine.corners(triangle)).length()
                     / self.solution.elements.nodes[element as usize].area;
-                leaves[leaf].1 += part * (error / own.max(self.mean)).powi(2);
+                leaves[leaf].1 += part * (error / own.max(self.mean_around(element))).powi(2);
             }
             leaves.iter_mut().for_each(|leaf| leaf.1 = leaf.1.sqrt());
             self.show(&fine);
@@ -233,6 +234,12 @@ impl Rounds<'_> {
         fine
     }
 
+    /// Mean irradiance of what surrounds an element, at most that of all surfaces, averaged over the colours, W·m⁻²: what errors count
+    /// relative to where it is dark.
+    fn mean_around(&self, element: NodeId) -> f64 {
+        self.mean * self.solution.brightness(element)
+    }
+
     /// Looks for lines in leaves that are wanting, where links have not told them, for their parts to follow.
     fn look_for_lines(&mut self, leaves: &[NodeId]) {
         if self.solution.visibility == Visibility::Links {
@@ -241,8 +248,10 @@ impl Rounds<'_> {
         let BakeOptions { weight, min_weight, tolerance, .. } = *self.options;
         let (surroundings, solution) = (self.surroundings, &self.solution);
         let scene = surroundings.scene;
-        let least =
-            |diameter| min_weight.unwrap_or_else(|| weight.minimum_in_leaf(scene, solution, tolerance, diameter));
+        let least = |leaf, diameter| {
+            let mean = || weight.minimum_in_leaf(scene, solution, tolerance, diameter);
+            min_weight.unwrap_or_else(|| solution.brightness(leaf) * mean())
+        };
         let gather = Gather::with_source_error(surroundings, solution, DIM * tolerance);
         let lines = &mut self.lines;
         self.emitted.with_shafts(leaves, |leaves| lines.search(scene, (solution, &gather), leaves, weight, least));

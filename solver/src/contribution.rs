@@ -49,10 +49,10 @@ impl Gather<'_> {
         let Some(leaf) = self.leaf_under(polygon, position, DVec3::ZERO, inward) else { return Vec::new() };
         let leaf = self.over(leaf);
         let mut found: BTreeMap<Sender, Contribution> = BTreeMap::new();
-        let LeafGather { gather, polygon, centre, .. } = leaf;
+        let LeafGather { gather, polygon, centre, budget, .. } = leaf;
         let emitted_by = |sources: Vec<Source>, faint: FaintGroups, sky: SkyView| {
             let blockers = leaf.blockers.clone();
-            let alone = LeafGather { gather, polygon, centre, sources, faint, rays: 0, sky, blockers };
+            let alone = LeafGather { gather, polygon, centre, sources, faint, rays: 0, budget, sky, blockers };
             alone.emitted(position, inward, Cosine::Shading).total()
         };
         for source in &leaf.sources {

@@ -125,6 +125,11 @@ impl<'a> Gather<'a> {
         Self::with(surroundings, solution, Opening::ByIrradiance(budget), (rays_for(source_error), 0))
     }
 
+    /// The same with so many rays, and with the leaves that they meet: for light over reflectors alone.
+    pub(crate) fn with_leaves(surroundings: &'a Surroundings<'a>, solution: &'a Solution, rays: u32) -> Self {
+        Self::with(surroundings, solution, Opening::ByIrradiance(f64::NEG_INFINITY), (rays, 0))
+    }
+
     /// The same with rays that have nothing in common with those of another `turn`, and with smaller nodes.
     pub fn with_turned_rays(
         surroundings: &'a Surroundings<'a>,
@@ -165,7 +170,7 @@ impl<'a> Gather<'a> {
             tree: &surroundings.tree,
             emitters: &surroundings.emitters,
             emitter_tree: surroundings.emitter_tree.as_ref(),
-            rays: RayGather::new(surroundings, sampling, opening.budget()),
+            rays: RayGather::new(surroundings, sampling),
             sampling,
             opening,
             small: surroundings.small,
@@ -273,6 +278,7 @@ impl<'a> Gather<'a> {
                     sources: Vec::new(),
                     faint: FaintGroups::default(),
                     rays: self.rays_over(element),
+                    budget: self.budget_over(element),
                     sky: SkyView::default(),
                     blockers: Vec::new(),
                 }
@@ -307,6 +313,11 @@ impl<'a> Gather<'a> {
     /// Irradiance, luminance, W·m⁻², that one reflector may misplace at a point; nothing where that is not what decides.
     pub fn budget(&self) -> f64 {
         self.opening.budget()
+    }
+
+    /// The same at points of an element: where it is dim, less.
+    pub(crate) fn budget_over(&self, element: NodeId) -> f64 {
+        self.budget() * self.solution.brightness(element)
     }
 
     /// Whether a node is opened for a point that has a form factor to it, of which the plane misplaces the `curved` part.
@@ -376,6 +387,7 @@ impl<'a> Gather<'a> {
             sources,
             faint: FaintGroups::default(),
             rays: 0,
+            budget: self.budget(),
             sky: SkyView::default(),
             blockers,
         }

@@ -57,13 +57,13 @@ impl LeafGather<'_> {
     /// is not worth a look at so many obstacles, or they are not known.
     pub(crate) fn is_seen_by_rays(&self, emitter: &Source, obstacles: usize, unoccluded: f64) -> bool {
         let is_too_much = obstacles as f64 > self.rays_wanted(unoccluded).max(OBSTACLES);
-        emitter.blockers.is_none() || is_too_much || (obstacles > 0 && unoccluded <= self.gather.budget())
+        emitter.blockers.is_none() || is_too_much || (obstacles > 0 && unoccluded <= self.budget)
     }
 
     /// How many rays it takes to tell what arrives of so much light, luminance, W·m⁻².
     fn rays_wanted(&self, unoccluded: f64) -> f64 {
         // What rays that are spread evenly are off by falls with their number to the power of −3/4.
-        let relative = unoccluded / self.gather.budget().max(f64::MIN_POSITIVE);
+        let relative = unoccluded / self.budget.max(f64::MIN_POSITIVE);
         (relative / (2.0 * SCATTER)).powf(4.0 / 3.0)
     }
 

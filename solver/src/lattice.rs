@@ -71,13 +71,18 @@ pub fn spread(shift: DVec2, i: u32) -> DVec2 {
     (shift + STEP * f64::from(i)).fract()
 }
 
-/// Directions about a normal with a density of the cosine over π.
+/// The golden ratio's part beyond one: turned by it from ray to ray, none lie in line.
+const GOLDEN: f64 = 0.618_033_988_749_894_8;
+
+/// Directions about a normal with a density of the cosine over π: those over the places of a spiral that are as far apart along it as
+/// across (Vogel 1979). The square's lattice wrapped around the pole lies twelve times as close by height as by azimuth near the
+/// horizon, and rays by it scatter by a quarter more.
 pub fn hemisphere(normal: DVec3, count: u32, shift: DVec2) -> impl Iterator<Item = DVec3> {
     let (x, y) = normal.any_orthonormal_pair();
     // It turns by the same angle from ray to ray, which costs less than to find each by its sine and cosine.
-    let [mut azimuth, turn] = [shift.y, STEP.y].map(|part| DVec2::from_angle(TAU * part));
+    let [mut azimuth, turn] = [shift.y, GOLDEN].map(|part| DVec2::from_angle(TAU * part));
     (0..count).map(move |i| {
-        let u = spread(shift, i).x;
+        let u = (f64::from(i) + shift.x) / f64::from(count);
         let DVec2 { x: cos, y: sin } = azimuth;
         azimuth = azimuth.rotate(turn);
         (x * cos + y * sin) * u.sqrt() + normal * (1.0 - u).sqrt()

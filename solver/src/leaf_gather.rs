@@ -48,6 +48,8 @@ pub struct LeafGather<'a> {
     pub(crate) faint: FaintGroups,
     /// Rays that each of its points looks at reflectors with, in a scene without links.
     pub(crate) rays: u32,
+    /// Irradiance, luminance, W·m⁻², that one of many sources may misplace at its points.
+    pub(crate) budget: f64,
     /// What its points may see of the sky.
     pub(crate) sky: SkyView,
     /// All blockers of all sources, ascending.
@@ -164,7 +166,7 @@ impl LeafGather<'_> {
             }
             Some(rays) => {
                 let from = self.gather.viewpoint(self.polygon, position, inward, cosine);
-                rays.seen_nodes(self.gather.solution, (self.polygon, self.rays), &from, seen);
+                rays.seen_nodes(self.gather.solution, (self.polygon, self.rays, self.budget), &from, seen);
             }
         }
     }

@@ -13,7 +13,7 @@ use crate::lattice::{hemisphere, shift};
 use crate::leaf_gather::SeenNode;
 use crate::patch_tree::PatchTree;
 use crate::surroundings::Surroundings;
-use crate::{NodeId, Patch, Solution};
+use crate::{NodeId, Outlook, Patch, Solution};
 
 /// Rays from a point for a source error of `RAYS_ERROR`. What rays that are spread evenly miss falls with their number to the
 /// power of −3/4.
@@ -38,6 +38,12 @@ pub const SMALL_LEAF: f64 = 1.0 / 12_000.0;
 /// Rays from points of small elements, as a part of all: as the root of the area is less, down to this. There are many of them.
 const FEW_RAYS: f64 = 0.25;
 
+/// Rays from points of an element by its [`Outlook::contrast`]: as many as are asked for where that is the usual one, and with the power at
+/// which so many rays in all scatter least, if what one ray is off by falls with their number to the power of −3/4; within bounds,
+/// since a first look may be mistaken.
+const CONTRAST_POWER: f64 = 0.8;
+const BY_CONTRAST: [f64; 2] = [0.25, 2.0];
+
 /// How far from a contact a point is taken to be, along its direction of approach, as a fraction of the scene's size: above
 /// the rounding of rays, below anything that light tells apart.
 pub(crate) const ASIDE: f64 = 1e-7;
@@ -49,30 +55,30 @@ pub(crate) struct RayGather<'a> {
     /// Rays from a point of an element that is large enough; and which of all possible rays.
     rays: u32,
     turn: u32,
-    /// Irradiance, luminance, W·m⁻², that may be misplaced on account of nodes that stand for the leaves that rays meet.
-    budget: f64,
 }
 
 impl<'a> RayGather<'a> {
-    /// Prepares so many rays a point; none where there are links, or nothing reflects. `budget` is how much light, luminance, W·m⁻²,
-    /// nodes may misplace at a point; rays of another turn are others.
-    pub fn new(surroundings: &'a Surroundings<'a>, (rays, turn): (u32, u32), budget: f64) -> Option<Self> {
+    /// Prepares so many rays a point; none where there are links, or nothing reflects. Rays of another turn are others.
+    pub fn new(surroundings: &'a Surroundings<'a>, (rays, turn): (u32, u32)) -> Option<Self> {
         let patches = surroundings.patches.as_ref()?;
-        Some(Self { surroundings, patches, rays, turn, budget })
+        Some(Self { surroundings, patches, rays, turn })
     }
 
     /// Rays from each point of an element, at least one.
     pub fn rays_over(&self, solution: &Solution, element: NodeId) -> u32 {
         let part = (solution.elements.nodes[element as usize].area / self.surroundings.small).sqrt();
-        ((f64::from(self.rays) * part.clamp(FEW_RAYS, 1.0)) as u32).max(1)
+        let [contrast, usual] =
+            [solution.outlook(element), Outlook::UNKNOWN].map(|outlook| f64::from(outlook.contrast));
+        let by_contrast = (contrast / usual).powf(CONTRAST_POWER).clamp(BY_CONTRAST[0], BY_CONTRAST[1]);
+        ((f64::from(self.rays) * part.clamp(FEW_RAYS, 1.0) * by_contrast) as u32).max(1)
     }
 
     /// Appends the nodes of reflectors that a point of a polygon sees by so many rays; ascending, each once. The point is taken to be
-    /// just in front of all that touches it.
+    /// just in front of all that touches it. Nodes that misplace more than the budget, luminance, W·m⁻², are opened.
     pub fn seen_nodes(
         &self,
         solution: &Solution,
-        (polygon, rays): (u32, u32),
+        (polygon, rays, budget): (u32, u32, f64),
         point: &Viewpoint,
         seen: &mut Vec<SeenNode>,
     ) {
@@ -104,7 +110,9 @@ impl<'a> RayGather<'a> {
             let part = 1.0 / f64::from(self.rays).sqrt();
             let per_area = -hit.normal.dot(direction) / (PI * hit.distance * hit.distance);
             let form_factor = |node: NodeId| (elements.nodes[node as usize].area * per_area).clamp(part, 1.0);
-            let node = self.standing_for(solution, patch, place, form_factor);
+            let node = self.standing_for(solution, patch, place, |node| {
+                self.misplaced(solution, node, form_factor(node)) > budget
+            });
             let offset = patch.along(place - elements.nodes[node as usize].centre);
             seen.push(SeenNode { node, form_factor: share, offset });
         }
@@ -130,7 +138,7 @@ impl<'a> RayGather<'a> {
         solution: &Solution,
         patch: &Patch,
         place: DVec3,
-        form_factor: impl Fn(NodeId) -> f64,
+        is_opened: impl Fn(NodeId) -> bool,
     ) -> NodeId {
         let elements = &solution.elements;
         let place = patch.along(place - patch.origin);
@@ -139,7 +147,7 @@ impl<'a> RayGather<'a> {
             (cell.cell_min - place).max(place - cell.cell_max).max_element()
         };
         let mut node = patch.root;
-        while self.misplaced(solution, node, form_factor(node)) > self.budget
+        while is_opened(node)
             && let Some(child) = elements.children(node).min_by(|&a, &b| outside(a).total_cmp(&outside(b)))
         {
             node = child;
@@ -212,12 +220,17 @@ mod tests {
         let (rays, budget) = (1024, 0.05);
         let surroundings = Surroundings::new(&room, &solution);
         let patches = PatchTree::new(&solution.elements);
-        let gather = RayGather { surroundings: &surroundings, patches: &patches, rays, turn: 0, budget };
+        let gather = RayGather { surroundings: &surroundings, patches: &patches, rays, turn: 0 };
         let mut opened = 0;
         for i in 0..40 {
             let position = DVec3::new(0.55 + 0.03 * f64::from(i), 0.6 + 0.02 * f64::from(i * 7 % 40), 0.0);
             let mut seen = Vec::new();
-            gather.seen_nodes(&solution, (4, rays), &Viewpoint::flat(position, DVec3::Z, DVec3::ZERO), &mut seen);
+            gather.seen_nodes(
+                &solution,
+                (4, rays, budget),
+                &Viewpoint::flat(position, DVec3::Z, DVec3::ZERO),
+                &mut seen,
+            );
             for SeenNode { node, form_factor, .. } in seen {
                 let is_leaf = solution.elements.is_leaf(node);
                 let is_root = solution.elements.patches.iter().any(|patch| patch.root == node);
@@ -241,9 +254,9 @@ mod tests {
         let solution = solve(&room, &SolveOptions { link_error: Some(0.1), bounces: None }, &|_| ());
         let surroundings = Surroundings::new(&room, &solution);
         let patches = PatchTree::new(&solution.elements);
-        let gather = RayGather { surroundings: &surroundings, patches: &patches, rays: 256, turn: 0, budget: 1e-3 };
+        let gather = RayGather { surroundings: &surroundings, patches: &patches, rays: 256, turn: 0 };
         let floor = solution.patch_roots(4).next().expect("the floor is a patch");
-        let looks = (4, gather.rays_over(&solution, floor));
+        let looks = (4, gather.rays_over(&solution, floor), 1e-3);
         let (mut sums, mut turned_sums) = (Vec::new(), Vec::new());
         for i in 0..40 {
             let position = DVec3::new(0.1 + 0.094 * f64::from(i), 0.2 + f64::from(i * 7 % 40) * 0.065, 0.0);

@@ -56,19 +56,20 @@ impl<'a> Gather<'a> {
     /// stands before.
     pub fn strong_emitters(&self, element: NodeId, shafts: &mut Shafts) -> Vec<Interaction> {
         let leaf = self.over_shafts(element, shafts);
+        let least = STRONG * leaf.budget;
         let normal = self.geometry.plane(leaf.polygon).normal;
         let strong = |source: Source| {
             let blockers = source.blockers.filter(|_| source.body.is_none())?;
             let radiosity = luminance(self.scene.material(source.polygon).exitance());
             let form_factor = form_factor_at(leaf.centre, normal, self.geometry.outline(source.polygon));
-            (form_factor * radiosity >= STRONG * self.budget()).then_some(Interaction {
+            (form_factor * radiosity >= least).then_some(Interaction {
                 source: source.polygon,
                 far_outline: None,
                 radiosity,
                 blockers,
             })
         };
-        let small_cells = leaf.small_cells(normal, STRONG * self.budget());
+        let small_cells = leaf.small_cells(normal, least);
         leaf.sources.into_iter().filter_map(strong).chain(small_cells).collect()
     }
 
@@ -79,10 +80,8 @@ impl<'a> Gather<'a> {
         let (outline, horizon) = (elements.outline(element), self.horizon(polygon));
         let plane = horizon.plane;
         let centre = elements.nodes[element as usize].centre;
-        let cut = self
-            .emitter_tree()
-            .map(|tree| tree.cut(outline, &horizon, FAINT_GROUP * self.budget()))
-            .unwrap_or_default();
+        let budget = self.budget_over(element);
+        let cut = self.emitter_tree().map(|tree| tree.cut(outline, &horizon, FAINT_GROUP * budget)).unwrap_or_default();
         let mut sources = Vec::new();
         for number in cut.single {
             let emitter = &self.emitters[number as usize];
@@ -97,7 +96,7 @@ impl<'a> Gather<'a> {
                     form_factor_at(centre, plane.normal, &corners)
                 }),
             };
-            let is_faint = luminance(form_factor * exitance) <= FAINT * self.budget();
+            let is_faint = luminance(form_factor * exitance) <= FAINT * budget;
             let blockers = if is_faint {
                 None
             } else {
@@ -126,7 +125,7 @@ impl<'a> Gather<'a> {
         blockers.sort_unstable();
         blockers.dedup();
         let faint = FaintGroups::new(cut.groups, element);
-        LeafGather { gather: self, polygon, centre, sources, faint, rays: 0, sky, blockers }
+        LeafGather { gather: self, polygon, centre, sources, faint, rays: 0, budget, sky, blockers }
     }
 
     /// What stands in the shaft between an emitter and an element.

@@ -5,7 +5,7 @@ use scene::{Rgb, Scene, luminance};
 use serde::{Deserialize, Serialize};
 
 use crate::linear_fit::fit_inner_nodes;
-use crate::{Elements, NodeId, Openings, SkyCells};
+use crate::{Elements, NodeId, Openings, Outlook, SkyCells};
 
 /// What a solve is asked for.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -173,6 +173,8 @@ pub struct Solution {
     pub sky: SkyCells,
     /// Which of its cells are seen from where, in scenes of very many polygons.
     pub openings: Option<Openings>,
+    /// What each node has around it; empty until somebody has looked, and with links.
+    pub outlooks: Vec<Outlook>,
 }
 
 impl Solution {
@@ -228,7 +230,20 @@ impl Solution {
                 light.push(ElementLight { irradiance: plane.at(offset), ..plane });
             }
             self.first_link.push(self.links.len() as u32);
+            if let Some(&outlook) = self.outlooks.get(leaf as usize) {
+                self.outlooks.push(outlook);
+            }
         }
+    }
+
+    /// What a node has around it, as far as is known.
+    pub fn outlook(&self, node: NodeId) -> Outlook {
+        self.outlooks.get(node as usize).copied().unwrap_or(Outlook::UNKNOWN)
+    }
+
+    /// How bright it is around a node: mean irradiance, as a part of that of all surfaces, at most 1.
+    pub fn brightness(&self, node: NodeId) -> f64 {
+        f64::from(self.outlook(node).brightness)
     }
 
     /// Replaces the light that leaf elements reflect by what is known better; inner nodes follow.

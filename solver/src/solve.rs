@@ -98,6 +98,7 @@ pub fn solve(scene: &Scene, options: &SolveOptions, progress: &(dyn Fn(f64) + Sy
         visibility: Visibility::Links,
         sky: SkyCells::default(),
         openings: None,
+        outlooks: Vec::new(),
     }
 }
 
@@ -133,6 +134,7 @@ fn unlinked(
         visibility: Visibility::Rays,
         sky,
         openings,
+        outlooks: Vec::new(),
     }
 }
 
