@@ -33,9 +33,11 @@ const MUCH: f64 = 0.5;
 /// chance, more leaves what costs next to nothing to mend.
 const CHEAP: f64 = 0.25;
 
-/// What light from emitters may use up of the share of reflected light, where rays find that. In a row of rooms it is had for a quarter of
-/// the time; in a hall, where many faint emitters are told by rays, less divides leaves for what these scatter by, without end.
-const EMITTED_BY_RAYS: f64 = 1.5;
+/// What light from emitters may use up of the share of reflected light, where rays find that: with so few emitters, and with more. In a row
+/// of rooms it is had for a quarter of the time. Where there are many, most are faint at a point, and told by single rays: less divides
+/// leaves for what these scatter by, without end.
+const EMITTED_BY_RAYS: [f64; 2] = [1.2, 1.8];
+const FEW_EMITTERS: usize = 32;
 
 /// Discontinuities that a leaf follows at most where links have not told them: a leaf that is wanting is divided besides. Ten
 /// double the triangles of a hall, and mend no more.
@@ -280,7 +282,7 @@ impl Rounds<'_> {
     fn share_of_emitted(&self) -> f64 {
         match self.solution.visibility {
             Visibility::Links => self.share,
-            Visibility::Rays => self.share * EMITTED_BY_RAYS,
+            Visibility::Rays => self.share * EMITTED_BY_RAYS[usize::from(self.surroundings.emitters() > FEW_EMITTERS)],
         }
     }
 

@@ -26,7 +26,7 @@ const BOUNCES: u32 = 8;
 const STEPS: u32 = 6;
 
 /// The least brightness that is told apart. Below, light is found as if the surroundings were as bright as that.
-const LEAST_BRIGHTNESS: f64 = 0.02;
+const LEAST_BRIGHTNESS: f64 = 0.05;
 
 /// The part of an element's contrast, as a square, that is that of the elements it sees: few rays miss a bright door as often as not.
 const SHARED: f64 = 0.5;

@@ -38,10 +38,10 @@ pub const SMALL_LEAF: f64 = 1.0 / 12_000.0;
 /// Rays from points of small elements, as a part of all: as the root of the area is less, down to this. There are many of them.
 const FEW_RAYS: f64 = 0.25;
 
-/// Rays from points of an element by its [`Outlook::contrast`]: as many as are asked for where that is the usual one, and with the power at
-/// which so many rays in all scatter least, if what one ray is off by falls with their number to the power of −3/4; within bounds,
-/// since a first look may be mistaken.
-const CONTRAST_POWER: f64 = 0.8;
+/// Rays from points of an element by its [`Outlook::contrast`]: as many as are asked for where that is the usual one. With a power of 0.8
+/// so many rays in all would scatter least, as what one is off by falls with their number to the power of −3/4; less allows for what a
+/// first look is mistaken by, and so do the bounds.
+const CONTRAST_POWER: f64 = 0.6;
 const BY_CONTRAST: [f64; 2] = [0.25, 2.0];
 
 /// How far from a contact a point is taken to be, along its direction of approach, as a fraction of the scene's size: above

@@ -57,6 +57,11 @@ impl<'a> Surroundings<'a> {
         }
     }
 
+    /// Number of emitters: polygons, or convex bodies that emit the same all over.
+    pub fn emitters(&self) -> usize {
+        self.emitters.len()
+    }
+
     /// Places on an element that something stands over, no farther off than half its length: the feet of polygons' middles, at most
     /// so many, first of those that hide most.
     pub fn feet(&self, solution: &Solution, element: NodeId, most: usize) -> Vec<DVec3> {
