@@ -33,13 +33,14 @@ pub(crate) const fn row(length: usize) -> usize {
 
 /// Bytes of a solution, and of meshes like the one given; what was found out comes on top.
 pub(crate) fn held(solution: &Solution, fine: &FineMesh) -> usize {
-    let Solution { elements, cuts, links, blockers, irradiance, direct, light, .. } = solution;
+    let Solution { elements, cuts, links, blockers, irradiance, direct, light, outlooks, .. } = solution;
     let solution = size_of_val(elements.nodes.as_slice())
         + size_of_val(elements.patches.as_slice())
         + size_of_val(elements.outlines.as_slice())
         + cuts.iter().map(|cuts| size_of_val(cuts.as_slice())).sum::<usize>()
         + size_of_val(links.as_slice())
         + blockers.bytes()
+        + size_of_val(outlooks.as_slice())
         + [irradiance, direct, light].map(|light| size_of_val(light.as_slice())).iter().sum::<usize>();
     let of_sample = size_of::<SampleQuery>() + 2 * size_of::<Vec3>();
     let of_triangle = size_of::<MeshTriangle>() + size_of::<[u32; 6]>() + size_of::<Vec3>();

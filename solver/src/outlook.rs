@@ -25,7 +25,8 @@ const BOUNCES: u32 = 8;
 /// and it is nothing that an eye adapts to; more mix rooms through their doors.
 const STEPS: u32 = 6;
 
-/// The least brightness that is told apart. Below, light is found as if the surroundings were as bright as that.
+/// The least brightness that is told apart: below, light is found as if the surroundings were as bright as that. Slits of furnished rooms
+/// are darker, and would cost as much as all else.
 const LEAST_BRIGHTNESS: f64 = 0.05;
 
 /// The part of an element's contrast, as a square, that is that of the elements it sees: few rays miss a bright door as often as not.

@@ -21,8 +21,8 @@ const RAYS: f64 = 200.0;
 const RAYS_ERROR: f64 = 0.0036;
 
 /// What a single ray would be off by, in standard deviations of the light that a point sees by direction: spread evenly, rays are off
-/// by less than independent ones. It is what rooms and halls are baked best with. Less divides leaves for what rays scatter by,
-/// more leaves errors of that size alone.
+/// by less than independent ones. Of furnished rooms, which are all borders, it is half of what they are off by, but what rooms and
+/// halls are baked best with. Less divides leaves for what rays scatter by, more leaves errors of that size alone.
 const SCATTER: f64 = 0.75;
 
 /// Rays from a point at least and at most. Less than the least saves next to nothing in a hall, half of whose time goes to its lamps,
