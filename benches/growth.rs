@@ -107,13 +107,13 @@ impl Measured {
 
 /// Bakes a model, and holds it against paths.
 fn measure(model: &Path, output: &Path, tolerance: f64) -> Measured {
-    let text = |path: &Path| path.to_str().unwrap().to_owned();
+    let [model, output] = [model, output].map(|path| path.to_str().unwrap());
     let start = Instant::now();
-    let asked = ["--tolerance", &tolerance.to_string(), "--max-seconds", SECONDS, "--json"];
-    let bake = [&["bake", &text(model), "-o", &text(output)], &asked[..]].concat();
+    let asked = tolerance.to_string();
+    let bake = ["bake", model, "-o", output, "--tolerance", &asked, "--max-seconds", SECONDS, "--json"];
     let report = serde_json::from_slice(&halflight(&bake).stdout).unwrap();
     let seconds = start.elapsed().as_secs_f64();
-    let verify = ["verify", &text(output), "--points", POINTS, "--json"];
+    let verify = ["verify", output, "--points", POINTS, "--json"];
     let found = serde_json::from_slice(&halflight(&verify).stdout).unwrap();
     Measured { tolerance, seconds, report, found }
 }
