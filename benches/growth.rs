@@ -88,7 +88,9 @@ fn main() {
         times.push((polygons.ln(), seconds.ln()));
         memory.push((polygons.ln(), bytes.ln()));
     }
-    println!("\nExponents over polygons: time {:.2}, memory {:.2}.", slope(&times), slope(&memory));
+    if times.len() > 1 {
+        println!("\nExponents over polygons: time {:.2}, memory {:.2}.", slope(&times), slope(&memory));
+    }
 }
 
 /// A bake, and what was found of it.

@@ -167,13 +167,11 @@ pub fn resume(
     let mut rounds = Rounds {
         surroundings: &surroundings,
         options,
-        interrupted: control.interrupted,
         watch: control.watch,
         inquiry: Inquiry::new(control, &solution, answers, options.max_bytes),
         emitted: EmittedLight::default(),
         reflected: ReflectedLight::new(&solution, front),
         mean: colour_mean(solution.mean_irradiance),
-        is_guessed: !has_links,
         lines,
         share: if has_links { FIRST_SHARE } else { FIRST_SHARE_BY_RAYS },
         source_share: FIRST_SOURCE_SHARE,

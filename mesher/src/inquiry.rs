@@ -74,6 +74,11 @@ impl<'a> Inquiry<'a> {
         }
     }
 
+    /// Whether to stop at once: for work that asks no questions.
+    pub fn interrupted(&self) -> &'a (dyn Fn() -> bool + Sync) {
+        self.control.interrupted
+    }
+
     /// Takes note that leaves are as many times too coarse, in their error, as `excess` says.
     pub fn expect_division(&mut self, excess: f64) {
         self.forecast.expect_division(excess);

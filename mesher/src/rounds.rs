@@ -64,16 +64,12 @@ pub(crate) struct Rounds<'a> {
     pub solution: Solution,
     pub lines: Lines,
     pub inquiry: Inquiry<'a>,
-    /// Whether to stop at once.
-    pub interrupted: &'a (dyn Fn() -> bool + Sync),
     /// Who is shown every mesh, and all that is found out of its light.
     pub watch: Option<&'a (dyn Fn(Baked) + Sync)>,
     pub emitted: EmittedLight,
     pub reflected: ReflectedLight,
     /// Mean irradiance of all surfaces, averaged over the colours, W·m⁻².
     pub mean: f64,
-    /// Whether that is but a guess, since nobody has looked.
-    pub is_guessed: bool,
     /// The share of the tolerance that reflected light may use up in this round, and the other kind as much, but where rays find it.
     pub share: f64,
     /// The part of the tolerance that a row may misplace on account of each reflector.
@@ -93,14 +89,14 @@ impl Rounds<'_> {
         if !self.solution.reflects() || self.inquiry.stopped() {
             return fine;
         }
-        let share = match self.solution.visibility {
+        let residual_share = match self.solution.visibility {
             Visibility::Links => RESIDUAL_SHARE,
             Visibility::Rays => RESIDUAL_SHARE_BY_RAYS,
         };
         for mesh in 1..=MESHES {
             let exchange = Exchange {
                 source_error: self.source_share * self.options.tolerance,
-                residual: share * self.options.tolerance * self.mean * (1.0 - self.reflectance),
+                residual: residual_share * self.options.tolerance * self.mean * (1.0 - self.reflectance),
             };
             self.reflected.solve(self.surroundings, &mut self.solution, &fine, &exchange, &mut self.inquiry);
             if self.inquiry.stopped() {
@@ -201,9 +197,8 @@ impl Rounds<'_> {
 
     /// Divides leaves until light from emitters is interpolated well enough.
     fn mesh_emitted(&mut self) -> FineMesh {
-        if std::mem::take(&mut self.is_guessed)
-            && let Some(look) = first_look(self.surroundings, &self.solution, self.interrupted)
-        {
+        let is_guessed = self.solution.visibility == Visibility::Rays && self.solution.outlooks.is_empty();
+        if is_guessed && let Some(look) = first_look(self.surroundings, &self.solution, self.inquiry.interrupted()) {
             self.solution.mean_irradiance = look.mean_irradiance;
             self.solution.outlooks = look.outlooks;
             self.mean = colour_mean(look.mean_irradiance);

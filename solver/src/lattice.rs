@@ -116,6 +116,21 @@ mod tests {
         assert_eq!(hemisphere(DVec3::Z, 0, DVec2::ZERO).count(), 0);
     }
 
+    /// Seen from above, where all parts of a disc count the same, none lie together: 1.9 would be a perfect grid of triangles.
+    #[test]
+    fn directions_keep_apart() {
+        for count in [50, 200, 500] {
+            let places: Vec<DVec3> =
+                hemisphere(DVec3::Z, count, shift(DVec3::ONE, 0)).map(|way| way.with_z(0.0)).collect();
+            let nearest = |(i, place): (usize, &DVec3)| {
+                let others = places.iter().enumerate().filter(|other| other.0 != i);
+                others.map(|other| place.distance(*other.1)).fold(f64::INFINITY, f64::min)
+            };
+            let least = places.iter().enumerate().map(nearest).fold(f64::INFINITY, f64::min);
+            assert!(least * f64::from(count).sqrt() > 1.3, "{count}: {least}");
+        }
+    }
+
     /// A trapezium of unequal triangles: as many places in each part as its area says, and all inside.
     #[test]
     fn places_are_spread_by_area() {
