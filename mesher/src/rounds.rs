@@ -28,9 +28,10 @@ const MESHES_BY_RAYS: u32 = 4;
 const FEW: usize = 50;
 const MUCH: f64 = 0.5;
 
-/// Where rays find the light, leaves are divided down to this part of the allowed square even if the whole keeps it, as long as
-/// they are few, and meshes too: in a hall one leaf in 300, over a lamp, holds more of the error than all boxes. Less divides by
-/// chance, more leaves what costs next to nothing to mend.
+/// Where rays find light over reflectors, leaves are divided down to this part of the allowed square even if the whole keeps it, as long
+/// as they are few, and meshes too: in a hall one leaf in 300, over a lamp, holds more of the error than all boxes. Less divides by
+/// chance, more leaves what costs next to nothing to mend. Of light from emitters a few thousand leaves of a large hall would be
+/// divided again and again for a third of its time, for what rays to faint lamps scatter by.
 const CHEAP: f64 = 0.25;
 
 /// What light from emitters may use up of the share of reflected light, where rays find that: with so few emitters, and with more. In a row
@@ -52,7 +53,7 @@ const SMALLEST_LEAF: f64 = 1e-3;
 const RESIDUAL_SHARE: f64 = 0.02;
 
 /// The same in a scene without links, whose dim rooms count by their own light.
-const RESIDUAL_SHARE_BY_RAYS: f64 = 0.002;
+const RESIDUAL_SHARE_BY_RAYS: f64 = 0.01;
 
 /// An emitter that sends less than this part of the tolerance to a point is dim there.
 const DIM: f64 = 0.5;
@@ -118,9 +119,10 @@ impl Rounds<'_> {
                     (error.element, error.error / own.max(self.mean_around(error.element)))
                 })
                 .collect();
-            let is_late = self.solution.visibility == Visibility::Rays && mesh >= MESHES_BY_RAYS;
-            let most = if is_late { leaves.len() / FEW } else { usize::MAX };
-            let (divided, excess) = self.wanting(&leaves, self.share, mesh, most);
+            let by_rays = self.solution.visibility == Visibility::Rays;
+            let is_late = mesh >= MESHES_BY_RAYS;
+            let most = if by_rays && is_late { leaves.len() / FEW } else { usize::MAX };
+            let (divided, excess) = self.wanting(&leaves, self.share, by_rays && !is_late, most);
             self.inquiry.expect_division(excess);
             if divided.is_empty() || mesh == MESHES || fine.triangles() > self.options.max_triangles {
                 break;
@@ -205,7 +207,7 @@ impl Rounds<'_> {
             self.reflectance = look.reflectance.min(LARGEST_REFLECTANCE);
         }
         let mut fine = self.fine_mesh();
-        for mesh in 1..=MESHES {
+        for _ in 1..=MESHES {
             let mut leaves: Vec<(NodeId, f64)> = fine.leaves.iter().map(|leaf| (leaf.element, 0.0)).collect();
             for (triangle, (error, emitted)) in fine.probe_emitted().into_iter().enumerate() {
                 let leaf = fine.mesh.triangles[triangle].leaf as usize;
@@ -217,7 +219,7 @@ impl Rounds<'_> {
             }
             leaves.iter_mut().for_each(|leaf| leaf.1 = leaf.1.sqrt());
             self.show(&fine);
-            let (divided, _) = self.wanting(&leaves, self.share_of_emitted(), mesh, usize::MAX);
+            let (divided, _) = self.wanting(&leaves, self.share_of_emitted(), false, usize::MAX);
             if divided.is_empty() || fine.triangles() > self.options.max_triangles {
                 break;
             }
@@ -281,10 +283,10 @@ impl Rounds<'_> {
         }
     }
 
-    /// Of elements with their relative errors on a round's mesh of that number, those that are to be divided so that a share of
-    /// the tolerance is kept, or more if they are few, ascending; and the error of all in such shares, at least 1. Where more than
-    /// `most` are wanting, the worst of them, if these hold much of the error.
-    fn wanting(&self, leaves: &[(NodeId, f64)], share: f64, mesh: u32, most: usize) -> (Vec<NodeId>, f64) {
+    /// Of elements with their relative errors, those that are to be divided so that a share of the tolerance is kept, ascending, or
+    /// more than that `if_few` are; and the error of all in such shares, at least 1. Where more than `most` are wanting, the worst of them,
+    /// if these hold much of the error.
+    fn wanting(&self, leaves: &[(NodeId, f64)], share: f64, if_few: bool, most: usize) -> (Vec<NodeId>, f64) {
         let elements = &self.solution.elements;
         let area = |leaf: NodeId| elements.nodes[leaf as usize].area;
         let total: f64 = leaves.iter().map(|&(leaf, _)| area(leaf)).sum();
@@ -298,8 +300,7 @@ impl Rounds<'_> {
             })
             .collect();
         let square = weighted.iter().sum::<f64>();
-        let by_rays = self.solution.visibility == Visibility::Rays;
-        let cheap = if by_rays && mesh < MESHES_BY_RAYS { worst(&weighted, CHEAP * allowed) } else { Vec::new() };
+        let cheap = if if_few { worst(&weighted, CHEAP * allowed) } else { Vec::new() };
         let mut chosen = if !cheap.is_empty() && cheap.len() * FEW <= leaves.len() {
             cheap
         } else if square > allowed {
