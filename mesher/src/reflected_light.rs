@@ -11,7 +11,7 @@
 
 use glam::{DVec2, DVec3, Vec3};
 use rayon::prelude::*;
-use scene::{Rgb, Scene, Seen};
+use scene::{Rgb, Scene, Seen, luminance};
 use solver::{ElementLight, Gather, NodeId, SeenNode, Solution, Surroundings, Visibility};
 
 use crate::SampleQuery;
@@ -92,8 +92,9 @@ impl ReflectedLight {
         let places = self.places(solution, fine);
         let rows: Vec<&Row> = stand_ins.queries.iter().map(|query| self.row(query, inquiry)).collect();
         let table = &self.coarse.table;
-        let receive =
-            |solution: &Solution| stand_ins.of_samples(table, &Radiosity::of(scene, solution).received(&rows));
+        let receive = |solution: &Solution| {
+            stand_ins.of_samples(table, &Radiosity::of(scene, solution).received(&rows), |_| 0.0)
+        };
         let samples = self.coarse.table.queries.len();
         // From darkness, so that what is dark stays exactly dark; later on from the light that is known, where all bounces count.
         let mut values =
@@ -111,6 +112,17 @@ impl ReflectedLight {
             if solution.bounces.is_none() && moved <= options.residual {
                 break;
             }
+        }
+        if solution.visibility == Visibility::Rays {
+            // What was sent is averaged over many leaves, what is shown is not.
+            let radiosity = Radiosity::of(scene, solution);
+            let looked = radiosity.received(&rows);
+            let gather = Gather::with_source_error(surroundings, solution, options.source_error);
+            let scatter = |query: u32| {
+                let spread = radiosity.spread(rows[query as usize]) * luminance(looked[query as usize].as_dvec3());
+                TRUE_SCATTER * gather.scatter(stand_ins.queries[query as usize].element) * spread
+            };
+            values = stand_ins.of_samples(table, &looked, scatter);
         }
         self.coarse.values = values;
     }
@@ -301,6 +313,10 @@ pub(crate) struct Exchange {
     /// The largest change of a sample with which the iteration ends, W·m⁻².
     pub residual: f64,
 }
+
+/// What looks by rays scatter by in furnished rooms, in what [`Gather::scatter`] takes for granted: where slopes are told from chance.
+/// Less takes chance for slopes, half as much again finds no more.
+const TRUE_SCATTER: f64 = 3.0;
 
 /// What a row may misplace before it is looked at anew, in what one reflector may misplace at a point: a row names a hundred
 /// nodes. Less finds most rows wanting after every division.

@@ -3,7 +3,7 @@
 use glam::Vec3;
 use rayon::prelude::*;
 use scene::{Rgb, Scene};
-use solver::{Cosine, PrincipalAxes, SMALL_LEAF, Solution, Visibility};
+use solver::{Cosine, LinearLight, PrincipalAxes, SMALL_LEAF, Solution, Visibility};
 
 use crate::{Leaf, Mesh, MeshTriangle, SampleQuery, SampleTable};
 
@@ -90,17 +90,28 @@ impl StandIns {
         stand_ins
     }
 
-    /// The light of the samples of the same table, from that at the queries; never negative.
-    pub fn of_samples(&self, table: &SampleTable, looked: &[Vec3]) -> Vec<Vec3> {
+    /// The light of the samples of the same table, from that at the queries; never negative. `scatter` is what a query is off by for
+    /// chance, root mean square, luminance, W·m⁻².
+    pub fn of_samples(
+        &self,
+        table: &SampleTable,
+        looked: &[Vec3],
+        scatter: impl Fn(u32) -> f64 + Sync,
+    ) -> Vec<Vec3> {
         let look = |query: u32| looked[query as usize].as_dvec3();
+        let over_leaf = |LeafPlane { first, axes }: &LeafPlane| {
+            let queries = *first..*first + axes.places().count() as u32;
+            let chance = queries.clone().map(|query| scatter(query).powi(2)).sum::<f64>() / queries.len() as f64;
+            axes.linear_light(|place| look(first + place), chance.sqrt())
+        };
+        let over_leaves: Vec<LinearLight> = self.planes.par_iter().with_min_len(256).map(over_leaf).collect();
         let sample = |(told, query): (&Told, &SampleQuery)| match *told {
             Told::Look(number) => look(number),
             Told::Aside(nearer) => look(nearer) * 2.0 - look(nearer + 1),
             Told::Planes([first, end]) => {
                 let around = &self.around[first as usize..end as usize];
                 let light = |&plane: &u32| {
-                    let LeafPlane { first, axes } = &self.planes[plane as usize];
-                    axes.plane_at(query.position, |place| look(first + place))
+                    self.planes[plane as usize].axes.at(&over_leaves[plane as usize], query.position)
                 };
                 around.iter().map(light).sum::<Rgb>() / around.len() as f64
             }
@@ -215,7 +226,7 @@ mod tests {
         let stand_ins = StandIns::new(&scene, &solution, &leaves, &mesh, (&table, &looked_at));
         let light = |position: DVec3| Rgb::new(1.0, 2.0, 3.0) * (1.0 + position.x + 2.0 * position.y);
         let looked: Vec<Vec3> = stand_ins.queries.iter().map(|query| light(query.position).as_vec3()).collect();
-        let samples = stand_ins.of_samples(&table, &looked);
+        let samples = stand_ins.of_samples(&table, &looked, |_| 0.0);
         for (sample, query) in samples.iter().zip(&table.queries) {
             // Looks are rounded to f32, and a plane goes on a little past them.
             let exact = light(query.position);
@@ -242,7 +253,7 @@ mod tests {
         let query =
             SampleQuery { position: DVec3::ZERO, polygon: 0, element: 0, inward: Vec3::ZERO, cosine: Cosine::Own };
         let table = SampleTable { queries: vec![query; 3], triangles: Vec::new() };
-        let samples = stand_ins.of_samples(&table, &[Vec3::splat(3.0), Vec3::ONE]);
+        let samples = stand_ins.of_samples(&table, &[Vec3::splat(3.0), Vec3::ONE], |_| 0.0);
         assert_eq!(samples, [3.0, 5.0, 4.0].map(Vec3::splat));
     }
 }

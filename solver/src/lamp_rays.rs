@@ -9,7 +9,7 @@ use scene::{Rgb, luminance};
 use crate::backprojection::Viewpoint;
 use crate::lattice::{Fan, STEP, shift};
 use crate::leaf_gather::{LeafGather, Source};
-use crate::principal_axes::PrincipalAxes;
+use crate::principal_axes::{LinearLight, PrincipalAxes};
 use crate::ray_gather::ASIDE;
 use crate::{Cosine, NodeId};
 
@@ -39,16 +39,16 @@ impl FaintGroups {
     }
 }
 
-/// Irradiance that is taken for linear over an element, W·m⁻²: by what it is at places on its axes.
+/// Irradiance that is taken for linear over an element.
 #[derive(Clone)]
 struct LightPlane {
     axes: PrincipalAxes,
-    looked: Vec<Rgb>,
+    light: LinearLight,
 }
 
 impl LightPlane {
     fn at(&self, position: DVec3) -> Rgb {
-        self.axes.plane_at(position, |place| self.looked[place as usize]).max(Rgb::ZERO)
+        self.axes.at(&self.light, position).max(Rgb::ZERO)
     }
 }
 
@@ -109,8 +109,9 @@ impl LeafGather<'_> {
         let patch = &elements.patches[elements.patch_of(element)? as usize];
         let axes = PrincipalAxes::new(elements.outline(element), patch)?;
         let light = |place| self.look_at_faint_groups(&gather.viewpoint(self.polygon, place, DVec3::ZERO, Cosine::Own));
-        let looked = axes.places().map(light).collect();
-        Some(LightPlane { axes, looked })
+        let looked: Vec<Rgb> = axes.places().map(light).collect();
+        let light = axes.linear_light(|place| looked[place as usize], 0.0);
+        Some(LightPlane { axes, light })
     }
 
     /// The same at a point: one place of each group is tried.

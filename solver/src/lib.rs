@@ -52,7 +52,7 @@ pub use leaf_gather::{DirectIrradiance, LeafGather, SeenNode};
 pub use linear_fit::colour_slope;
 pub use openings::{Openings, SeenCell};
 pub use outlook::{FirstLook, Outlook, first_look};
-pub use principal_axes::PrincipalAxes;
+pub use principal_axes::{LinearLight, PrincipalAxes};
 pub use ray_gather::SMALL_LEAF;
 pub use shafts::Shafts;
 pub use sky_cells::{SkyCell, SkyCells};

@@ -1,7 +1,7 @@
 //! The principal axes of a convex outline, and light that is taken for linear over it: by what it is at places on them.
 
 use glam::{DVec2, DVec3};
-use scene::Rgb;
+use scene::{Rgb, luminance};
 
 use crate::Patch;
 
@@ -16,6 +16,13 @@ pub struct PrincipalAxes {
     axes: Vec<DVec3>,
 }
 
+/// Irradiance that is linear over an outline, W·m⁻²: in the middle, and by how much it is more at the end of each axis.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LinearLight {
+    middle: Rgb,
+    slopes: [Rgb; 2],
+}
+
 impl PrincipalAxes {
     /// Those of an outline in a patch's plane; none without an area.
     pub fn new(outline: &[DVec3], patch: &Patch) -> Option<Self> {
@@ -28,14 +35,25 @@ impl PrincipalAxes {
         self.axes.iter().flat_map(|&axis| [self.centre + axis, self.centre - axis])
     }
 
-    /// The plane through what light is at the places, at a position; `light` is asked by the place's number.
-    pub fn plane_at(&self, position: DVec3, light: impl Fn(u32) -> Rgb) -> Rgb {
-        let along = |(first, axis): (u32, &DVec3)| {
-            let slope = axis.dot(position - self.centre) / axis.length_squared();
+    /// Light that is taken for linear, by what it is at the places; `light` is asked by the place's number. `scatter` is what that is
+    /// off by for chance, root mean square, luminance, W·m⁻²: a slope counts as far as it exceeds chance (the positive part of James &
+    /// Stein 1961). Over the outline slopes that are chance are off by twice as much as the mean is.
+    pub fn linear_light(&self, light: impl Fn(u32) -> Rgb, scatter: f64) -> LinearLight {
+        let (mut middle, mut slopes) = (Rgb::ZERO, [Rgb::ZERO; 2]);
+        for ((first, _), slope) in (0..).step_by(2).zip(&self.axes).zip(&mut slopes) {
             let [ahead, behind] = [light(first), light(first + 1)];
-            (ahead + behind) / (2 * self.axes.len()) as f64 + (ahead - behind) * (slope / 2.0)
-        };
-        (0..).step_by(2).zip(&self.axes).map(along).sum()
+            middle += (ahead + behind) / (2 * self.axes.len()) as f64;
+            let (square, chance) = (luminance(ahead - behind).powi(2), 2.0 * scatter * scatter);
+            let kept = if square > chance { 1.0 - chance / square } else { 0.0 };
+            *slope = (ahead - behind) / 2.0 * kept;
+        }
+        LinearLight { middle, slopes }
+    }
+
+    /// Such light at a position, W·m⁻².
+    pub fn at(&self, light: &LinearLight, position: DVec3) -> Rgb {
+        let along = |(&axis, &slope): (&DVec3, &Rgb)| slope * (axis.dot(position - self.centre) / axis.length_squared());
+        light.middle + self.axes.iter().zip(&light.slopes).map(along).sum::<Rgb>()
     }
 }
 
@@ -98,6 +116,21 @@ mod tests {
         assert!(axes.len() == 1 && axes[0].x.abs() > 1.0);
     }
 
+    /// Slopes of 10 and 1 from places that scatter by 1: what is left of the first is hardly less, of the second nothing.
+    #[test]
+    fn slopes_count_as_far_as_they_exceed_chance() {
+        let square = [(0.0, 0.0), (2.0, 0.0), (2.0, 2.0), (0.0, 2.0)].map(|(x, y)| DVec3::new(x, y, 0.0));
+        let axes = PrincipalAxes::new(&square, &patch()).unwrap();
+        let looked = [20.0, 0.0, 10.5, 9.5].map(Rgb::splat);
+        let found = |scatter: f64| axes.linear_light(|place| looked[place as usize], scatter);
+        let LinearLight { middle, slopes } = found(1.0);
+        assert_eq!((middle, slopes[1]), (Rgb::splat(10.0), Rgb::ZERO));
+        assert!((slopes[0].x - 10.0 * (1.0 - 2.0 / 400.0)).abs() < 1e-9);
+        assert_eq!(found(0.0).slopes, [Rgb::splat(10.0), Rgb::splat(0.5)]);
+        let flat = axes.linear_light(|_| Rgb::ONE, 0.0);
+        assert_eq!(flat, LinearLight { middle: Rgb::ONE, slopes: [Rgb::ZERO; 2] });
+    }
+
     /// Angles at which corners lie on a circle.
     fn angles() -> impl Strategy<Value = Vec<f64>> {
         prop::collection::vec(0.0..std::f64::consts::TAU, 3..9)
@@ -119,8 +152,8 @@ mod tests {
             if axes.axes.len() == 2 {
                 let light = |place: DVec3| Rgb::new(1.0, 2.0, 3.0) * (4.0 + place.x - 2.0 * place.y);
                 let looked: Vec<Rgb> = axes.places().map(light).collect();
-                let found = axes.plane_at(outline[0], |place| looked[place as usize]);
-                prop_assert!((found - light(outline[0])).length() < 1e-9);
+                let linear = axes.linear_light(|place| looked[place as usize], 0.0);
+                prop_assert!((axes.at(&linear, outline[0]) - light(outline[0])).length() < 1e-9);
             }
         }
     }
