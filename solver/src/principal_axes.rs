@@ -8,11 +8,15 @@ use crate::Patch;
 /// Width of an outline, as a part of its length, below which light is taken for the same all across it.
 const NARROW: f64 = 0.25;
 
+/// How long axes are, in the root mean square of what lies along them, where there are two. At 1 the places are those of Gauss' rule over
+/// a rectangle, but on the edges of a triangle, which may be contacts; shorter ones tell slopes less well.
+const INWARDS: f64 = 0.9;
+
 /// The middle of a convex outline, and its principal axes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PrincipalAxes {
     centre: DVec3,
-    /// As long as the root mean square of what lies along them, metres: two, or the longer one alone if the outline is narrow.
+    /// About as long as the root mean square of what lies along them, metres: two, or the longer one alone if the outline is narrow.
     axes: Vec<DVec3>,
 }
 
@@ -30,24 +34,26 @@ impl PrincipalAxes {
         Some(Self { centre, axes })
     }
 
-    /// Two places on each axis: those of Gauss' rule of two points over a rectangle. They lie within the outline.
+    /// The corners of the rectangle between the axes' ends, or the ends of a single one: every slope is told by all of them. They lie within
+    /// the outline, as does an ellipse whose half-axes are √2 times the root mean square (John 1948).
     pub fn places(&self) -> impl Iterator<Item = DVec3> {
-        self.axes.iter().flat_map(|&axis| [self.centre + axis, self.centre - axis])
+        let place = |number| self.axes.iter().enumerate().map(|(i, &axis)| axis * side(number, i)).sum::<DVec3>();
+        (0..1 << self.axes.len()).map(move |number| self.centre + place(number))
     }
 
     /// Light that is taken for linear, by what it is at the places; `light` is asked by the place's number. `scatter` is what that is
     /// off by for chance, root mean square, luminance, W·m⁻²: a slope counts as far as it exceeds chance (the positive part of James &
-    /// Stein 1961). Over the outline slopes that are chance are off by twice as much as the mean is.
+    /// Stein 1961).
     pub fn linear_light(&self, light: impl Fn(u32) -> Rgb, scatter: f64) -> LinearLight {
-        let (mut middle, mut slopes) = (Rgb::ZERO, [Rgb::ZERO; 2]);
-        for ((first, _), slope) in (0..).step_by(2).zip(&self.axes).zip(&mut slopes) {
-            let [ahead, behind] = [light(first), light(first + 1)];
-            middle += (ahead + behind) / (2 * self.axes.len()) as f64;
-            let (square, chance) = (luminance(ahead - behind).powi(2), 2.0 * scatter * scatter);
-            let kept = if square > chance { 1.0 - chance / square } else { 0.0 };
-            *slope = (ahead - behind) / 2.0 * kept;
-        }
-        LinearLight { middle, slopes }
+        let looked: Vec<Rgb> = (0..1 << self.axes.len()).map(light).collect();
+        let count = looked.len() as f64;
+        let slope = |axis: usize| {
+            let slope = (0..).zip(&looked).map(|(place, &light)| light * side(place, axis)).sum::<Rgb>() / count;
+            let (square, chance) = (luminance(slope).powi(2), scatter * scatter / count);
+            if square > chance { slope * (1.0 - chance / square) } else { Rgb::ZERO }
+        };
+        let slopes = [0, 1].map(|axis| if axis < self.axes.len() { slope(axis) } else { Rgb::ZERO });
+        LinearLight { middle: looked.iter().sum::<Rgb>() / count, slopes }
     }
 
     /// Such light at a position, W·m⁻².
@@ -55,6 +61,11 @@ impl PrincipalAxes {
         let along = |(&axis, &slope): (&DVec3, &Rgb)| slope * (axis.dot(position - self.centre) / axis.length_squared());
         light.middle + self.axes.iter().zip(&light.slopes).map(along).sum::<Rgb>()
     }
+}
+
+/// On which side of an axis a place is: ahead, 1, or behind, −1.
+fn side(place: u32, axis: usize) -> f64 {
+    if place >> axis & 1 == 0 { 1.0 } else { -1.0 }
 }
 
 fn principal_axes(outline: &[DVec3], patch: &Patch) -> Option<(DVec3, Vec<DVec3>)> {
@@ -84,10 +95,11 @@ fn principal_axes(outline: &[DVec3], patch: &Patch) -> Option<(DVec3, Vec<DVec3>
         return None;
     }
     let in_space = |way: DVec2| patch.u * way.x + patch.v * way.y;
-    let mut axes = vec![in_space(way) * long];
-    if short > NARROW * long {
-        axes.push(in_space(way.perp()) * short);
-    }
+    let axes = if short > NARROW * long {
+        vec![in_space(way) * (INWARDS * long), in_space(way.perp()) * (INWARDS * short)]
+    } else {
+        vec![in_space(way) * long]
+    };
     Some((outline[0] + in_space(middle), axes))
 }
 
@@ -108,25 +120,30 @@ mod tests {
         assert_eq!(principal_axes(&[DVec3::ONE; 3], &patch()), None);
         let rectangle = |x: f64, y: f64| [(0.0, 0.0), (x, 0.0), (x, y), (0.0, y)].map(|(x, y)| DVec3::new(x, y, 7.0));
         // Gauss' points of a side lie at 1/√12 of it from the middle.
+        let gauss = 1.0 / 12f64.sqrt();
         let (centre, axes) = principal_axes(&rectangle(1.0, 3.0), &patch()).unwrap();
         assert!(centre.distance(DVec3::new(0.5, 1.5, 7.0)) < 1e-12);
-        assert!((axes[0].y.abs() - 3.0 / 12f64.sqrt()).abs() < 1e-12 && axes[0].x.abs() < 1e-12);
-        assert!((axes[1].x.abs() - 1.0 / 12f64.sqrt()).abs() < 1e-12 && axes.len() == 2);
+        assert!((axes[0].y.abs() - INWARDS * 3.0 * gauss).abs() < 1e-12 && axes[0].x.abs() < 1e-12);
+        assert!((axes[1].x.abs() - INWARDS * gauss).abs() < 1e-12 && axes.len() == 2);
         let (_, axes) = principal_axes(&rectangle(5.0, 1.0), &patch()).unwrap();
         assert!(axes.len() == 1 && axes[0].x.abs() > 1.0);
     }
 
-    /// Slopes of 10 and 1 from places that scatter by 1: what is left of the first is hardly less, of the second nothing.
+    /// Slopes of 10 and 0.4 from places that scatter by 1, their slopes by a half: what is left of the first is hardly less, of the second
+    /// nothing.
     #[test]
     fn slopes_count_as_far_as_they_exceed_chance() {
         let square = [(0.0, 0.0), (2.0, 0.0), (2.0, 2.0), (0.0, 2.0)].map(|(x, y)| DVec3::new(x, y, 0.0));
         let axes = PrincipalAxes::new(&square, &patch()).unwrap();
-        let looked = [20.0, 0.0, 10.5, 9.5].map(Rgb::splat);
+        let [steep, slight] = [0, 1].map(|axis| axes.axes[axis] / axes.axes[axis].length_squared());
+        let light = |place: DVec3| Rgb::splat(20.0 + (steep * 10.0 + slight * 0.4).dot(place - axes.centre));
+        let looked: Vec<Rgb> = axes.places().map(light).collect();
         let found = |scatter: f64| axes.linear_light(|place| looked[place as usize], scatter);
         let LinearLight { middle, slopes } = found(1.0);
-        assert_eq!((middle, slopes[1]), (Rgb::splat(10.0), Rgb::ZERO));
-        assert!((slopes[0].x - 10.0 * (1.0 - 2.0 / 400.0)).abs() < 1e-9);
-        assert_eq!(found(0.0).slopes, [Rgb::splat(10.0), Rgb::splat(0.5)]);
+        assert!((middle - 20.0).length() < 1e-9);
+        assert_eq!(slopes[1], Rgb::ZERO);
+        assert!((slopes[0].x - (10.0 - 0.25 / 10.0)).abs() < 1e-9);
+        assert!((found(0.0).slopes[1].x - 0.4).abs() < 1e-9);
         let flat = axes.linear_light(|_| Rgb::ONE, 0.0);
         assert_eq!(flat, LinearLight { middle: Rgb::ONE, slopes: [Rgb::ZERO; 2] });
     }
