@@ -74,9 +74,17 @@ impl<'a> Inquiry<'a> {
         }
     }
 
-    /// Whether to stop at once: for work that asks no questions.
-    pub fn interrupted(&self) -> &'a (dyn Fn() -> bool + Sync) {
-        self.control.interrupted
+    /// A first look at the scene, which nobody remembers: it takes moments. `look` tells which part of it is done, 0..=1, and is told
+    /// whether to go on.
+    pub fn first_look<A>(&mut self, look: impl FnOnce(&(dyn Fn(f64) -> bool + Sync)) -> Option<A>) -> Option<A> {
+        let stretch = self.forecast.stretch(Kind::FirstLook, 1.0);
+        let found = look(&|part| {
+            stretch.advance(part);
+            !(self.control.interrupted)()
+        });
+        let seconds = stretch.seconds();
+        self.forecast.end(Kind::FirstLook, seconds, 1.0);
+        found
     }
 
     /// Takes note that leaves are as many times too coarse, in their error, as `excess` says.

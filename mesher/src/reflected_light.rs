@@ -92,9 +92,8 @@ impl ReflectedLight {
         let places = self.places(solution, fine);
         let rows: Vec<&Row> = stand_ins.queries.iter().map(|query| self.row(query, inquiry)).collect();
         let table = &self.coarse.table;
-        let receive = |solution: &Solution| {
-            stand_ins.of_samples(table, &Radiosity::of(scene, solution).received(&rows), |_| 0.0)
-        };
+        let receive =
+            |solution: &Solution| stand_ins.of_samples(table, &Radiosity::of(scene, solution).received(&rows), |_| 0.0);
         let samples = self.coarse.table.queries.len();
         // From darkness, so that what is dark stays exactly dark; later on from the light that is known, where all bounces count.
         let mut values =

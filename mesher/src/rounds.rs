@@ -200,7 +200,9 @@ impl Rounds<'_> {
     /// Divides leaves until light from emitters is interpolated well enough.
     fn mesh_emitted(&mut self) -> FineMesh {
         let is_guessed = self.solution.visibility == Visibility::Rays && self.solution.outlooks.is_empty();
-        if is_guessed && let Some(look) = first_look(self.surroundings, &self.solution, self.inquiry.interrupted()) {
+        let (surroundings, solution) = (self.surroundings, &self.solution);
+        let look = |go_on: &(dyn Fn(f64) -> bool + Sync)| first_look(surroundings, solution, go_on);
+        if is_guessed && let Some(look) = self.inquiry.first_look(look) {
             self.solution.mean_irradiance = look.mean_irradiance;
             self.solution.outlooks = look.outlooks;
             self.mean = colour_mean(look.mean_irradiance);

@@ -92,12 +92,7 @@ impl StandIns {
 
     /// The light of the samples of the same table, from that at the queries; never negative. `scatter` is what a query is off by for
     /// chance, root mean square, luminance, W·m⁻².
-    pub fn of_samples(
-        &self,
-        table: &SampleTable,
-        looked: &[Vec3],
-        scatter: impl Fn(u32) -> f64 + Sync,
-    ) -> Vec<Vec3> {
+    pub fn of_samples(&self, table: &SampleTable, looked: &[Vec3], scatter: impl Fn(u32) -> f64 + Sync) -> Vec<Vec3> {
         let look = |query: u32| looked[query as usize].as_dvec3();
         let over_leaf = |LeafPlane { first, axes }: &LeafPlane| {
             let queries = *first..*first + axes.places().count() as u32;
@@ -110,9 +105,8 @@ impl StandIns {
             Told::Aside(nearer) => look(nearer) * 2.0 - look(nearer + 1),
             Told::Planes([first, end]) => {
                 let around = &self.around[first as usize..end as usize];
-                let light = |&plane: &u32| {
-                    self.planes[plane as usize].axes.at(&over_leaves[plane as usize], query.position)
-                };
+                let light =
+                    |&plane: &u32| self.planes[plane as usize].axes.at(&over_leaves[plane as usize], query.position);
                 around.iter().map(light).sum::<Rgb>() / around.len() as f64
             }
             Told::Between(_) => Rgb::ZERO,

@@ -3,6 +3,8 @@
 //! How bright it is around an element says what an error counts there: in a room that is a tenth as bright as the others a tenth as
 //! much is seen. How much what it sees differs by direction says how many rays its points need.
 
+use std::sync::atomic::{AtomicUsize, Ordering};
+
 use glam::{DVec2, DVec3, Vec3};
 use rayon::prelude::*;
 use scene::{Rgb, luminance};
@@ -82,15 +84,16 @@ impl Look {
     }
 }
 
-/// Looks from one point of every leaf of a solution without links. None if it is `interrupted`.
+/// Looks from one point of every leaf of a solution without links. `go_on` is told which part of all looks has been made, 0..=1; None
+/// if it says no.
 pub fn first_look(
     surroundings: &Surroundings<'_>,
     solution: &Solution,
-    interrupted: &(dyn Fn() -> bool + Sync),
+    go_on: &(dyn Fn(f64) -> bool + Sync),
 ) -> Option<FirstLook> {
     let (scene, elements) = (surroundings.scene, &solution.elements);
     let leaves: Vec<NodeId> = scene.polygon_ids().flat_map(|polygon| solution.leaves_of(polygon)).collect();
-    let looks = looks(surroundings, solution, &leaves, interrupted)?;
+    let looks = looks(surroundings, solution, &leaves, go_on)?;
     let surface = |&leaf: &NodeId| {
         let reflectance = elements.polygon_of(leaf).map_or(Rgb::ZERO, |polygon| scene.reflectance(polygon));
         (reflectance.as_vec3(), elements.nodes[leaf as usize].area)
@@ -128,15 +131,16 @@ fn looks(
     surroundings: &Surroundings<'_>,
     solution: &Solution,
     leaves: &[NodeId],
-    interrupted: &(dyn Fn() -> bool + Sync),
+    go_on: &(dyn Fn(f64) -> bool + Sync),
 ) -> Option<Vec<Look>> {
     let elements = &solution.elements;
     let mut places = vec![0; elements.nodes.len()];
     leaves.iter().zip(0..).for_each(|(&leaf, place)| places[leaf as usize] = place);
     let lamps = Gather::with_source_error(surroundings, solution, SOURCE_ERROR);
     let reflectors = Gather::with_leaves(surroundings, solution, RAYS);
+    let made = AtomicUsize::new(0);
     let look = |&leaf: &NodeId| {
-        if interrupted() {
+        if !go_on(made.fetch_add(1, Ordering::Relaxed) as f64 / leaves.len() as f64) {
             return None;
         }
         let position = Fan::new(elements.outline(leaf)).place(DVec2::ZERO, leaf);
@@ -205,7 +209,7 @@ mod tests {
 
     fn looked(scene: &scene::Scene) -> (Solution, FirstLook) {
         let solution = solve(scene, &SolveOptions::default(), &|_| ());
-        let look = first_look(&Surroundings::new(scene, &solution), &solution, &|| false).expect("nobody interrupts");
+        let look = first_look(&Surroundings::new(scene, &solution), &solution, &|_| true).expect("nobody interrupts");
         (solution, look)
     }
 
@@ -245,6 +249,6 @@ mod tests {
         let (solution, look) = looked(&scene);
         assert_eq!((look.mean_irradiance, look.reflectance), (Rgb::ZERO, 0.0));
         assert!(look.outlooks.iter().all(|outlook| *outlook == Outlook::UNKNOWN));
-        assert_eq!(first_look(&Surroundings::new(&scene, &solution), &solution, &|| true), None);
+        assert_eq!(first_look(&Surroundings::new(&scene, &solution), &solution, &|part| part < 0.5), None);
     }
 }

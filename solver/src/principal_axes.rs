@@ -45,10 +45,12 @@ impl PrincipalAxes {
     /// off by for chance, root mean square, luminance, W·m⁻²: a slope counts as far as it exceeds chance (the positive part of James &
     /// Stein 1961).
     pub fn linear_light(&self, light: impl Fn(u32) -> Rgb, scatter: f64) -> LinearLight {
-        let looked: Vec<Rgb> = (0..1 << self.axes.len()).map(light).collect();
+        let mut looked = [Rgb::ZERO; 4];
+        let looked = &mut looked[..1 << self.axes.len()];
+        (0..).zip(&mut *looked).for_each(|(place, found)| *found = light(place));
         let count = looked.len() as f64;
         let slope = |axis: usize| {
-            let slope = (0..).zip(&looked).map(|(place, &light)| light * side(place, axis)).sum::<Rgb>() / count;
+            let slope = (0..).zip(&*looked).map(|(place, &light)| light * side(place, axis)).sum::<Rgb>() / count;
             let (square, chance) = (luminance(slope).powi(2), scatter * scatter / count);
             if square > chance { slope * (1.0 - chance / square) } else { Rgb::ZERO }
         };
@@ -58,7 +60,8 @@ impl PrincipalAxes {
 
     /// Such light at a position, W·m⁻².
     pub fn at(&self, light: &LinearLight, position: DVec3) -> Rgb {
-        let along = |(&axis, &slope): (&DVec3, &Rgb)| slope * (axis.dot(position - self.centre) / axis.length_squared());
+        let along =
+            |(&axis, &slope): (&DVec3, &Rgb)| slope * (axis.dot(position - self.centre) / axis.length_squared());
         light.middle + self.axes.iter().zip(&light.slopes).map(along).sum::<Rgb>()
     }
 }
