@@ -119,3 +119,84 @@ impl PolygonTree {
         found
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::Builder;
+
+    fn square(corner: DVec3, side: f64) -> [DVec3; 4] {
+        [DVec3::ZERO, DVec3::X, DVec3::X + DVec3::Y, DVec3::Y].map(|way| corner + way * side)
+    }
+
+    fn turned(mut outline: [DVec3; 4]) -> [DVec3; 4] {
+        outline.reverse();
+        outline
+    }
+
+    /// A floor of four by four, 0, under a hundred small plates a metre above it.
+    fn floor_under_plates() -> Scene {
+        let plate = |i: u32| square(DVec3::new(f64::from(i % 10) * 0.4, f64::from(i / 10) * 0.4, 1.0), 0.1);
+        let floor = Builder::default().material(0.5, 0.0).polygon(&square(DVec3::ZERO, 4.0));
+        (0..100).fold(floor, |scene, i| scene.polygon(&plate(i))).build()
+    }
+
+    #[test]
+    fn nothing_is_near_nothing() {
+        let tree = PolygonTree::new(&Scene::default());
+        assert_eq!(tree.near(DVec3::ZERO, 1.0), []);
+        assert_eq!(tree.around(&[], 1.0), []);
+        assert!(!tree.is_blocked(0, DVec3::ZERO, DVec3::Z, |_| false));
+    }
+
+    #[test]
+    fn what_is_near_is_what_a_loop_over_all_finds() {
+        let scene = floor_under_plates();
+        let tree = PolygonTree::new(&scene);
+        let within = |low: DVec3, high: DVec3| -> Vec<u32> {
+            let meets = |polygon: &u32| {
+                let outline = scene.outline(*polygon);
+                let (lowest, highest) = (outline[0], outline[2]);
+                lowest.cmple(high).all() && low.cmple(highest).all()
+            };
+            scene.polygon_ids().filter(meets).collect()
+        };
+        for (point, reach) in [(DVec3::new(0.43, 0.83, 0.98), 0.05), (DVec3::splat(1.0), 0.37), (DVec3::Z * 9.0, 1.0)] {
+            assert_eq!(tree.near(point, reach), within(point - reach, point + reach));
+            let outline = square(point, 0.55);
+            assert_eq!(tree.around(&outline, reach), within(outline[0] - reach, outline[2] + reach));
+        }
+    }
+
+    #[test]
+    fn a_shaft_has_what_each_polygon_is_classified_as() {
+        let scene = floor_under_plates();
+        let (tree, geometry) = (PolygonTree::new(&scene), Geometry::new(&scene));
+        let (below, above) = (square(DVec3::new(0.3, 0.3, 0.5), 1.0), turned(square(DVec3::new(0.6, 0.5, 1.5), 1.2)));
+        let shaft = Shaft::between(&below, &above);
+        let stands = |polygon: &u32| shaft.classify(geometry.outline(*polygon)) != Occlusion::Clear;
+        let all: Vec<u32> = scene.polygon_ids().filter(stands).collect();
+        assert!((5..12).contains(&all.len()) && !all.contains(&0), "{all:?}");
+        let few = all.len() - 1;
+        assert_eq!(tree.in_shaft(&geometry, &shaft), Stands::Some(all));
+        assert_eq!(tree.few_in_shaft(&geometry, &shaft, few), Stands::Many);
+        // One plate covers a narrow shaft.
+        let narrow = [0.9, 1.1].map(|height| square(DVec3::new(0.42, 0.42, height), 0.05));
+        let covered = tree.in_shaft(&geometry, &Shaft::between(&narrow[0], &turned(narrow[1])));
+        assert_eq!(covered, Stands::All);
+    }
+
+    #[test]
+    fn rays_meet_all_but_their_own_polygon_and_what_lets_them_through() {
+        let scene = floor_under_plates();
+        let tree = PolygonTree::new(&scene);
+        let (floor, plate) = (0, 12);
+        let [on_floor, beyond] = [0.0, 2.0].map(|height| DVec3::new(0.43, 0.46, height));
+        assert_eq!(tree.first_met(floor, on_floor, DVec3::Z), Some(plate));
+        assert_eq!(tree.first_met(plate, beyond, -DVec3::Z), Some(floor));
+        assert_eq!(tree.first_met(floor, on_floor + DVec3::X * 0.2, DVec3::Z), None);
+        assert!(tree.is_blocked(floor, on_floor, beyond, |_| false));
+        assert!(!tree.is_blocked(floor, on_floor, beyond, |polygon| polygon == plate));
+        assert!(!tree.is_blocked(plate, on_floor, beyond, |_| false));
+    }
+}
