@@ -2,30 +2,27 @@
 
 use std::path::PathBuf;
 
-use anyhow::{Result, bail};
-use bytesize::ByteSize;
-use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{ArgGroup, Args, Parser, Subcommand, ValueEnum};
-use glam::DVec3;
-use scene::{Camera, Exposure, ToneCurve};
+use scene::ToneCurve;
 use serde::Serialize;
 use viewer::Mode;
 
-use crate::failure::Usage;
-
+mod camera;
 mod environment;
 mod render;
 mod sky;
+mod values;
 
+pub use camera::{CameraFlags, Viewpoint};
 pub use environment::{EnvironmentFlags, SkySource};
 pub use render::{Budget, CoherenceFlags, Interpolation, RadianceChoice, RadianceFlags, RenderFlags, SamplerChoice};
 pub use sky::SkyFlags;
+pub use values::{ExposureChoice, ImageKind};
 
-/// Largest side of a picture, pixels: what every GPU of the last ten years takes as a texture.
-const LARGEST_SIDE: u32 = 16_384;
-
-/// Largest exposure value of either sign: beyond it 2^EV leaves the numbers that a picture is made of.
-const LARGEST_EV: f64 = 64.0;
+use values::{
+    exposure, fraction, image_path, mode, non_negative, number, opening_angle, png_path, positive, size, size_in_bytes,
+    tolerance, tone_curve, vector,
+};
 
 /// Most paths at a point: a quarter of a minute for one point, and 0.02 % of its light.
 const MOST_SAMPLES: i64 = 1 << 24;
@@ -225,27 +222,6 @@ const FRAMES: u32 = 60;
 /// Most frames: an hour of film.
 const MOST_FRAMES: i64 = 100_000;
 
-/// Where a picture is taken from: nothing (the scene's first camera, or one that sees the whole scene), a camera
-/// of the scene by name, or a free one.
-#[derive(Clone, Debug, Default, Args)]
-pub struct CameraFlags {
-    /// A camera of the scene, by name
-    #[arg(long, value_name = "NAME", conflicts_with_all = ["eye", "target", "up", "fov"])]
-    pub camera: Option<String>,
-    /// Position of the eye, metres
-    #[arg(long, value_name = "X,Y,Z", value_parser = vector, requires = "target", allow_hyphen_values = true)]
-    pub eye: Option<DVec3>,
-    /// A point in the middle of the picture, metres
-    #[arg(long, value_name = "X,Y,Z", value_parser = vector, requires = "eye", allow_hyphen_values = true)]
-    pub target: Option<DVec3>,
-    /// A direction that points up in the picture [default: 0,0,1]
-    #[arg(long, value_name = "X,Y,Z", value_parser = vector, requires = "eye", allow_hyphen_values = true)]
-    pub up: Option<DVec3>,
-    /// Full vertical opening angle, degrees, between 0 and 180 [default: 60]
-    #[arg(long, value_name = "DEG", value_parser = opening_angle, requires = "eye", allow_hyphen_values = true)]
-    pub fov: Option<f64>,
-}
-
 /// `halflight view`.
 #[derive(Debug, Args)]
 pub struct ViewFlags {
@@ -400,160 +376,6 @@ pub enum Method {
     Gather,
     /// Unbiased path tracing from the point, with its standard error.
     Path,
-}
-
-/// A fixed exposure, or one metered from the picture.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum ExposureChoice {
-    /// Metered.
-    Auto,
-    /// As given.
-    Fixed(Exposure),
-}
-
-/// The point of view that the camera flags ask for.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Viewpoint {
-    /// The scene's first camera.
-    Default,
-    /// A camera of the scene.
-    Named(String),
-    /// A camera of the user's own.
-    Free(Camera),
-}
-
-impl CameraFlags {
-    /// Checks that the four flags of a free camera make one.
-    pub fn viewpoint(&self) -> Result<Viewpoint> {
-        if let Some(name) = &self.camera {
-            return Ok(Viewpoint::Named(name.clone()));
-        }
-        let (Some(eye), Some(target)) = (self.eye, self.target) else { return Ok(Viewpoint::Default) };
-        if eye == target {
-            bail!(Usage("--eye and --target are the same point: move one, so that the view has a direction".into()));
-        }
-        let up = self.up.unwrap_or(DVec3::Z);
-        let camera = Camera { eye, target, up, vertical_fov: self.fov.unwrap_or(60.0).to_radians() };
-        if !camera.is_valid() {
-            bail!(Usage(format!(
-                "--up {},{},{} is zero or parallel to the view from --eye to --target: give one across it, such as \
-                 --up 0,1,0",
-                up.x, up.y, up.z
-            )));
-        }
-        Ok(Viewpoint::Free(camera))
-    }
-}
-
-fn number(text: &str) -> Result<f64, String> {
-    text.trim().parse().ok().filter(|value: &f64| value.is_finite()).ok_or_else(|| "must be a finite number".into())
-}
-
-fn non_negative(text: &str) -> Result<f64, String> {
-    let value = number(text)?;
-    if value >= 0.0 { Ok(value) } else { Err("must be 0 or more".into()) }
-}
-
-/// Smallest and largest tolerance: the one is beyond what f32 samples and the f64 geometry of a file with seven digits can
-/// keep, the other promises nothing.
-const TOLERANCES: std::ops::RangeInclusive<f64> = 1e-4..=0.5;
-
-fn tolerance(text: &str) -> Result<f64, String> {
-    let value = number(text)?;
-    let (low, high) = (TOLERANCES.start(), TOLERANCES.end());
-    if TOLERANCES.contains(&value) {
-        Ok(value)
-    } else {
-        Err(format!("must lie between {low} and {high}, such as 0.01"))
-    }
-}
-
-fn size_in_bytes(text: &str) -> Result<u64, String> {
-    match text.parse::<ByteSize>() {
-        Ok(ByteSize(bytes)) if bytes > 0 => Ok(bytes),
-        _ => Err("must be a size of more than nothing, such as 2GB or 500MB".into()),
-    }
-}
-
-fn positive(text: &str) -> Result<f64, String> {
-    let value = number(text)?;
-    if value > 0.0 { Ok(value) } else { Err("must be more than 0".into()) }
-}
-
-fn fraction(text: &str) -> Result<f64, String> {
-    let value = number(text)?;
-    if value > 0.0 && value < 1.0 { Ok(value) } else { Err("must lie between 0 and 1, such as 0.01 for 1 %".into()) }
-}
-
-fn opening_angle(text: &str) -> Result<f64, String> {
-    let value = number(text)?;
-    if value > 0.0 && value < 180.0 { Ok(value) } else { Err("must lie between 0 and 180 degrees".into()) }
-}
-
-fn vector(text: &str) -> Result<DVec3, String> {
-    let numbers: Vec<f64> = text.split(',').map(number).collect::<Result<_, _>>()?;
-    let [x, y, z] = numbers[..] else {
-        return Err("must be three numbers with commas between, such as 1,2.5,-3".into());
-    };
-    Ok(DVec3::new(x, y, z))
-}
-
-fn size(text: &str) -> Result<(u32, u32), String> {
-    let side = |text: &str| text.parse().ok().filter(|side| (1..=LARGEST_SIDE).contains(side));
-    let sides = text.split_once(['x', 'X']).and_then(|(width, height)| Some((side(width)?, side(height)?)));
-    sides.ok_or_else(|| format!("must be two numbers of pixels between 1 and {LARGEST_SIDE}, such as 640x480"))
-}
-
-fn exposure(text: &str) -> Result<ExposureChoice, String> {
-    if text == "auto" {
-        return Ok(ExposureChoice::Auto);
-    }
-    match number(text) {
-        Ok(ev) if ev.abs() <= LARGEST_EV => Ok(ExposureChoice::Fixed(Exposure { ev: ev as f32 })),
-        _ => Err(format!("must be auto or a number between -{LARGEST_EV} and {LARGEST_EV}")),
-    }
-}
-
-fn image_path(text: &str) -> Result<PathBuf, String> {
-    let path = PathBuf::from(text);
-    match ImageKind::of(&path) {
-        Some(_) => Ok(path),
-        None => Err("the name must end in .png or .exr".into()),
-    }
-}
-
-fn png_path(text: &str) -> Result<PathBuf, String> {
-    let path = PathBuf::from(text);
-    if ImageKind::of(&path) == Some(ImageKind::Png) { Ok(path) } else { Err("the name must end in .png".into()) }
-}
-
-fn mode() -> impl TypedValueParser<Value = Mode> {
-    PossibleValuesParser::new(Mode::ALL.map(Mode::name)).try_map(|text| text.parse::<Mode>())
-}
-
-fn tone_curve() -> impl TypedValueParser<Value = ToneCurve> {
-    let named = |text: String| ToneCurve::ALL.into_iter().find(|curve| curve.name() == text).ok_or("no such curve");
-    PossibleValuesParser::new(ToneCurve::ALL.map(ToneCurve::name)).try_map(named)
-}
-
-/// A kind of picture file, by the end of its name.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum ImageKind {
-    /// What a display shows: 8 bits, sRGB.
-    Png,
-    /// Radiance, linear.
-    Exr,
-}
-
-impl ImageKind {
-    /// The kind that a file name says, if it is one of ours.
-    pub fn of(path: &std::path::Path) -> Option<Self> {
-        match path.extension()?.to_str()?.to_ascii_lowercase().as_str() {
-            "png" => Some(Self::Png),
-            "exr" => Some(Self::Exr),
-            _ => None,
-        }
-    }
 }
 
 #[cfg(test)]

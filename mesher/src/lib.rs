@@ -21,6 +21,7 @@ mod lines;
 mod memory;
 mod probe;
 mod projection;
+mod radiosity;
 mod ranking;
 mod refinement;
 mod reflected_light;

@@ -11,8 +11,8 @@
 
 use glam::{DVec2, DVec3, Vec3};
 use rayon::prelude::*;
-use scene::{Rgb, Scene, Seen, luminance};
-use solver::{ElementLight, Gather, NodeId, SeenNode, Solution, Surroundings, Visibility};
+use scene::{Rgb, Seen, luminance};
+use solver::{Gather, NodeId, SeenNode, Solution, Surroundings, Visibility};
 
 use crate::SampleQuery;
 use crate::coarse_mesh::{CoarseMesh, Light, Place};
@@ -20,6 +20,7 @@ use crate::fine_mesh::FineMesh;
 use crate::inquiry::Inquiry;
 use crate::leaf_error::{LeafError, ProbedLeaf, leaf_errors, leaf_probes, probe};
 use crate::projection::Projection;
+use crate::radiosity::{Radiosity, Row};
 use crate::samples::ByQuery;
 use crate::stand_ins::StandIns;
 
@@ -35,9 +36,6 @@ pub(crate) struct ReflectedLight {
     /// What is reflected, at each sample of the fine mesh: the irradiance one bounce earlier.
     pub reflecting: Vec<Vec3>,
 }
-
-/// What a sample sees of the reflectors.
-type Row = [Seen];
 
 impl ReflectedLight {
     /// No light yet, and a front of elements that are no longer than `length`, metres, where the solution has such. Elements
@@ -347,50 +345,6 @@ fn is_stale(gather: &Gather<'_>, row: &Row, allowed: f64) -> bool {
     row.iter().map(|seen| excess(seen).powi(2)).sum::<f64>() > allowed * allowed
 }
 
-/// What every node reflects: its radiosity as a plane, W·m⁻², and its change by the unit of a row's offsets; in the digits that
-/// light needs, so that the light of a room stays in a processor's cache.
-struct Radiosity(Vec<[Vec3; 3]>);
-
-impl Radiosity {
-    fn of(scene: &Scene, solution: &Solution) -> Self {
-        let node = |(node, light): (usize, &ElementLight)| {
-            let polygon = solution.elements.polygon_of(node as u32);
-            let reflectance = polygon.map_or(Rgb::ZERO, |polygon| scene.reflectance(polygon));
-            let unit = solution.elements.cell_length(node as u32) / f64::from(Seen::LENGTH);
-            [light.irradiance, light.gradient_u * unit, light.gradient_v * unit]
-                .map(|part| (reflectance * part).as_vec3())
-        };
-        Self(solution.light.par_iter().enumerate().with_min_len(256).map(node).collect())
-    }
-
-    /// How much what a row sees differs by direction: the standard deviation of its radiosity, relative to its mean.
-    fn spread(&self, row: &Row) -> f64 {
-        let [mut all, mut sum, mut square] = [0.0; 3];
-        for seen in row {
-            let radiosity = f64::from(self.0[seen.node as usize][0].element_sum());
-            let part = f64::from(seen.form_factor());
-            all += part;
-            sum += part * radiosity;
-            square += part * radiosity * radiosity;
-        }
-        // What meets nothing sees the dark.
-        let variance = square * all.max(1.0) - sum * sum;
-        if sum > 0.0 { variance.max(0.0).sqrt() / sum } else { 0.0 }
-    }
-
-    /// What rows receive, W·m⁻².
-    fn received(&self, rows: &[&Row]) -> Vec<Vec3> {
-        let part = |seen: &Seen| {
-            let [middle, along_u, along_v] = self.0[seen.node as usize];
-            // Light that is linear and nowhere negative is nowhere more than twice its mean.
-            let [u, v] = seen.offset.map(f32::from);
-            let there = middle + along_u * u + along_v * v;
-            there.min(middle * 2.0).max(Vec3::ZERO) * seen.form_factor()
-        };
-        rows.par_iter().with_min_len(64).map(|row| row.iter().map(part).sum::<Vec3>()).collect()
-    }
-}
-
 fn total(coarse: &CoarseMesh, light: Light, emitted: &[Vec3], places: &[Option<Place>]) -> Vec<Vec3> {
     let reflected = |place: &Option<Place>| place.map_or(Vec3::ZERO, |place| coarse.at(place, light).as_vec3());
     emitted.par_iter().zip(places).with_min_len(256).map(|(&emitted, place)| emitted + reflected(place)).collect()
@@ -415,17 +369,6 @@ pub(crate) fn offset(solution: &Solution, element: NodeId, position: DVec3) -> D
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn light_that_differs_by_direction_is_spread() {
-        let radiosity = Radiosity([0.0, 3.0, 3.0].map(|light| [Vec3::splat(light), Vec3::ZERO, Vec3::ZERO]).to_vec());
-        let seen = |node: u32, form_factor: f64| Seen::new(node, form_factor, DVec2::ZERO);
-        let spread = |row: &[Seen]| radiosity.spread(row);
-        assert_eq!([spread(&[]), spread(&[seen(0, 1.0)]), spread(&[seen(1, 0.5), seen(2, 0.5)])], [0.0; 3]);
-        assert_eq!(spread(&[seen(0, 0.5), seen(1, 0.25), seen(2, 0.25)]), 1.0);
-        assert_eq!(spread(&[seen(1, 0.5)]), 1.0, "the rest is dark");
-        assert!(spread(&[seen(0, 0.9), seen(1, 0.1)]) > 2.9);
-    }
 
     #[test]
     fn the_largest_moves_may_be_passed_over() {

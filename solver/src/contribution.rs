@@ -6,7 +6,8 @@ use glam::DVec3;
 use scene::{Rgb, luminance};
 
 use crate::lamp_rays::FaintGroups;
-use crate::leaf_gather::{LeafGather, SeenNode, Source};
+use crate::leaf_gather::{LeafGather, Source};
+use crate::seen_node::SeenNode;
 use crate::sky_view::SkyView;
 use crate::{Cosine, Gather};
 

@@ -10,10 +10,9 @@ use scene::Ray;
 
 use crate::backprojection::Viewpoint;
 use crate::lattice::{hemisphere, shift};
-use crate::leaf_gather::SeenNode;
 use crate::patch_tree::PatchTree;
 use crate::surroundings::Surroundings;
-use crate::{NodeId, Outlook, Patch, Solution};
+use crate::{NodeId, Outlook, Patch, SeenNode, Solution};
 
 /// Rays from a point for a source error of `RAYS_ERROR`. What rays that are spread evenly miss falls with their number to the
 /// power of −3/4.

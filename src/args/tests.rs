@@ -1,7 +1,10 @@
 #![allow(clippy::unwrap_used)]
 use clap::CommandFactory;
+use glam::DVec3;
+use scene::Exposure;
 
 use super::*;
+use crate::failure::Usage;
 
 fn refused(arguments: &[&str]) -> String {
     let flags = Flags::try_parse_from([&["halflight"], arguments].concat());
