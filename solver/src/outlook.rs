@@ -84,7 +84,7 @@ impl Look {
     }
 }
 
-/// Looks from one point of every leaf of a solution without links. `go_on` is told which part of all looks has been made, 0..=1; None
+/// Looks from one point of every leaf of a solution without links. `go_on` is told which part of all looks has begun, 0..=1; None
 /// if it says no.
 pub fn first_look(
     surroundings: &Surroundings<'_>,
@@ -138,9 +138,9 @@ fn looks(
     leaves.iter().zip(0..).for_each(|(&leaf, place)| places[leaf as usize] = place);
     let lamps = Gather::with_source_error(surroundings, solution, SOURCE_ERROR);
     let reflectors = Gather::with_leaves(surroundings, solution, RAYS);
-    let made = AtomicUsize::new(0);
+    let begun = AtomicUsize::new(0);
     let look = |&leaf: &NodeId| {
-        if !go_on(made.fetch_add(1, Ordering::Relaxed) as f64 / leaves.len() as f64) {
+        if !go_on((begun.fetch_add(1, Ordering::Relaxed) + 1) as f64 / leaves.len() as f64) {
             return None;
         }
         let position = Fan::new(elements.outline(leaf)).place(DVec2::ZERO, leaf);
