@@ -20,8 +20,7 @@ pub use sky::SkyFlags;
 pub use values::{ExposureChoice, ImageKind};
 
 use values::{
-    exposure, fraction, image_path, mode, non_negative, number, opening_angle, png_path, positive, size, size_in_bytes,
-    tolerance, tone_curve, vector,
+    exposure, fraction, image_path, mode, non_negative, png_path, positive, size, size_in_bytes, tolerance, tone_curve,
 };
 
 /// Most paths at a point: a quarter of a minute for one point, and 0.02 % of its light.

@@ -21,10 +21,10 @@ pub(crate) enum Kind {
 /// the larger the less, an office 36, a row of rooms 125.
 const ALL_BY_FIRST_LOOK: f64 = 20.0;
 
-/// Time of the first look from all samples, in that of the look from probes alone before; and in that of all looks at emitters
+/// Time of the first rows of all samples, in that of the rows of probes alone before; and in that of all looks at emitters
 /// so far, before either is known. The office and halls take 6 to 17, and 1 to 36.
-const FIRST_LOOK: f64 = 8.0;
-const FIRST_LOOK_BY_EMITTED: f64 = 4.0;
+const FROM_SAMPLES: f64 = 8.0;
+const FROM_SAMPLES_BY_EMITTED: f64 = 4.0;
 
 /// Time of all later looks of a round in that of the first one, before an error is known; with links, and by rays, which divide
 /// few leaves.
@@ -119,8 +119,8 @@ impl<'a> Forecast<'a> {
             (Kind::FirstLook, _) => (ALL_BY_FIRST_LOOK * seconds, 0.0),
             (Kind::Residuals, _) => (0.0, 0.0),
             (Kind::Emitted, _) if !self.reflects => (seconds, 0.0),
-            (Kind::Emitted, 0) => (FIRST_LOOK_BY_EMITTED * (self.asked + seconds) * (1.0 + later), self.residual),
-            (Kind::Rows, 0) => (FIRST_LOOK * seconds * (1.0 + later), residual),
+            (Kind::Emitted, 0) => (FROM_SAMPLES_BY_EMITTED * (self.asked + seconds) * (1.0 + later), self.residual),
+            (Kind::Rows, 0) => (FROM_SAMPLES * seconds * (1.0 + later), residual),
             (Kind::Rows, 1) => (later * seconds, residual),
             _ => ((self.left - seconds).max(0.0), self.residual),
         }

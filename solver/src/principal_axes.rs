@@ -35,15 +35,15 @@ impl PrincipalAxes {
     }
 
     /// The corners of the rectangle between the axes' ends, or the ends of a single one: every slope is told by all of them. They lie within
-    /// the outline, as does an ellipse whose half-axes are √2 times the root mean square (John 1948).
+    /// the outline, as does the ellipse whose half-axes are √2 times the root mean square (Kannan, Lovász & Simonovits 1995, theorem 4.1).
     pub fn places(&self) -> impl Iterator<Item = DVec3> {
         let place = |number| self.axes.iter().enumerate().map(|(i, &axis)| axis * side(number, i)).sum::<DVec3>();
         (0..1 << self.axes.len()).map(move |number| self.centre + place(number))
     }
 
     /// Light that is taken for linear, by what it is at the places; `light` is asked by the place's number. `scatter` is what that is
-    /// off by for chance, root mean square, luminance, W·m⁻²: a slope counts as far as it exceeds chance (the positive part of James &
-    /// Stein 1961).
+    /// off by for chance, root mean square, luminance, W·m⁻²: of a slope the part counts that its square exceeds chance by, as in a Wiener
+    /// filter whose signal is told from what is seen.
     pub fn linear_light(&self, light: impl Fn(u32) -> Rgb, scatter: f64) -> LinearLight {
         let mut looked = [Rgb::ZERO; 4];
         let looked = &mut looked[..1 << self.axes.len()];

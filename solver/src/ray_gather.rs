@@ -20,7 +20,7 @@ const RAYS: f64 = 200.0;
 const RAYS_ERROR: f64 = 0.0036;
 
 /// What a single ray would be off by, in standard deviations of the light that a point sees by direction: spread evenly, rays are off
-/// by less than independent ones. Of furnished rooms, which are all borders, it is half of what they are off by, but what rooms and
+/// by less than independent ones. Of furnished rooms, which are all borders, it is a half to a third of what they are off by, but what rooms and
 /// halls are baked best with. Less divides leaves for what rays scatter by, more leaves errors of that size alone.
 const SCATTER: f64 = 0.75;
 

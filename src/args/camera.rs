@@ -5,7 +5,7 @@ use clap::Args;
 use glam::DVec3;
 use scene::Camera;
 
-use super::{opening_angle, vector};
+use super::values::{opening_angle, vector};
 use crate::failure::Usage;
 
 /// Where a picture is taken from: nothing (the scene's first camera, or one that sees the whole scene), a camera

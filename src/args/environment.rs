@@ -6,7 +6,7 @@ use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use scene::{CIE_SKIES, UpAxis};
 
-use super::{non_negative, number, positive};
+use super::values::{non_negative, number, positive};
 
 /// An environment, in place of the one that a scene file has.
 #[derive(Clone, Debug, Default, Args)]

@@ -6,8 +6,8 @@ use clap::{Args, ValueEnum};
 use renderer::{Filter, Interval, Rule};
 use scene::ToneCurve;
 
+use super::values::{exposure, fraction, image_path, number, png_path, positive, size, tone_curve};
 use super::{CameraFlags, ExposureChoice, ImageKind, MOST_SAMPLES, SceneFlags, SkyFlags};
-use super::{exposure, fraction, image_path, number, png_path, positive, size, tone_curve};
 
 /// Pixels of a coherence map's work image along a side of each of the picture's, where nothing is said: Guo's.
 const SUPERSAMPLE: u32 = 3;

@@ -6,7 +6,7 @@ use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 use renderer::{SkySampling, Visibility};
 
-use super::{number, png_path};
+use super::values::{number, png_path};
 
 /// Most lights: more than a picture tells apart.
 const MOST_LIGHTS: i64 = 4096;
